@@ -1,0 +1,36 @@
+"""Topic names, message types and quality of service: what the nodes agree on."""
+
+from __future__ import annotations
+
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+from maglev_msgs.msg import ControllerState, Currents, Measurement, PlantState, Reference
+
+MEASUREMENT = '/stage/measurement'
+CURRENTS = '/stage/currents'
+REFERENCE = '/reference'
+CONTROLLER_STATE = '/controller/state'
+TRUE_STATE = '/stage/true_state'
+DIAGNOSTICS = '/diagnostics'
+
+SAMPLE_TOPICS: dict[str, type] = {
+    MEASUREMENT: Measurement,
+    CURRENTS: Currents,
+    REFERENCE: Reference,
+    CONTROLLER_STATE: ControllerState,
+    TRUE_STATE: PlantState,
+}
+"""The topics that carry one message a sample, with their types."""
+
+
+def sample_qos(depth: int = 4096) -> QoSProfile:
+    """Reliable, in order, nothing kept for late joiners: no sample may be lost or come twice.
+
+    ``depth`` samples, a second and more of lockstep, are kept for a reader that is busy.
+    """
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=depth,
+        reliability=ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.VOLATILE,
+    )
