@@ -1,0 +1,1 @@
+"""The plant of the maglev stage: physics, encoders, amplifiers, and its node."""

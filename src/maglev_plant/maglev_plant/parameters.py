@@ -1,0 +1,276 @@
+"""Every parameter of the simulated stage; the defaults are the benchmark plant."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+from maglev_node.parameters import ParameterError, group, parameter
+from maglev_plant.machine import AXES, MachineParameters
+
+_BY_AXIS = ', by axis y, x, z, phi, theta'
+
+_LONGEST_STEP = 1.5
+"""Longest integration step in time constants of the friction; stable up to 2.78."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class AmplifierParameters:
+    """The three-phase amplifiers, one per motor."""
+
+    bandwidth: float = parameter(
+        2000.0,
+        unit='Hz',
+        lower=0.0,
+        upper=1e5,
+        description='corner frequency of the first-order current loop, 0 for no lag',
+    )
+    peak_current: float = parameter(
+        7.0, unit='A', lower=0.1, upper=100.0, description='greatest current of a phase'
+    )
+    continuous_current: float = parameter(
+        5.0, unit='A', lower=0.1, upper=100.0, description='current a phase carries for ever'
+    )
+    thermal_time: float = parameter(
+        2.0,
+        unit='s',
+        lower=0.01,
+        upper=1e4,
+        description='time constant of the thermal load, which follows (current / continuous)^2',
+    )
+    thermal_recovery: float = parameter(
+        0.9,
+        lower=0.0,
+        upper=1.0,
+        description='a phase that has spent its budget (load 1) gets its peak back below this load',
+    )
+    dq_scaling: str = parameter(
+        'amplitude',
+        choices=('amplitude', 'rms'),
+        description='whether dq currents are amplitudes or RMS values of the phase currents',
+    )
+
+    def __post_init__(self) -> None:
+        """Refuse a continuous current above the peak."""
+        if self.continuous_current > self.peak_current:
+            raise ParameterError(
+                f"parameter 'continuous_current' is {self.continuous_current:g} A, it must not "
+                f"exceed 'peak_current' ({self.peak_current:g} A)"
+            )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class EncoderParameters:
+    """Four encoders on the vertical guides, which read the gaps, and two horizontal ones."""
+
+    gap_resolution: float = parameter(
+        10e-6, unit='m', lower=0.0, upper=1e-3, description='count of the gap encoders, 0 for none'
+    )
+    horizontal_resolution: float = parameter(
+        10e-6,
+        unit='m',
+        lower=0.0,
+        upper=1e-3,
+        description='count of the x and z encoders, 0 for none',
+    )
+    gap_noise: float = parameter(
+        0.0,
+        unit='m',
+        lower=0.0,
+        upper=1e-3,
+        description='standard deviation of Gaussian noise before the gap encoders count',
+    )
+    horizontal_noise: float = parameter(
+        0.0,
+        unit='m',
+        lower=0.0,
+        upper=1e-3,
+        description='standard deviation of Gaussian noise before the x and z encoders count',
+    )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class GuideParameters:
+    """Friction of the linear guides, as a deceleration per axis, and stoppers that lock an axis."""
+
+    coulomb: tuple[float, ...] = parameter(
+        (0.303, 0.171, 0.149, 1.32, 1.32),
+        unit='m/s^2, rad/s^2',
+        lower=0.0,
+        upper=100.0,
+        length=5,
+        description='Coulomb friction f in f tanh(v / v0)' + _BY_AXIS,
+    )
+    coulomb_velocity: tuple[float, ...] = parameter(
+        (1e-3, 1e-3, 1e-3, 1e-3, 1e-3),
+        unit='m/s, rad/s',
+        lower=1e-6,
+        upper=0.1,
+        length=5,
+        description='velocity v0 in f tanh(v / v0)' + _BY_AXIS,
+    )
+    viscous: tuple[float, ...] = parameter(
+        (0.5, 0.5, 0.5, 0.5, 0.5),
+        unit='1/s',
+        lower=0.0,
+        upper=1000.0,
+        length=5,
+        description='viscous friction' + _BY_AXIS,
+    )
+    locked: tuple[bool, ...] = parameter(
+        (False, False, False, False, False),
+        length=5,
+        description='stopper inserted: the axis keeps its initial position' + _BY_AXIS,
+    )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class StopParameters:
+    """The vertical stops are seats around the centre; where they lie is in the machine's group."""
+
+    seat_radius: float = parameter(
+        0.1,
+        unit='m',
+        lower=0.0,
+        upper=1.0,
+        description='distance of the seats from the centre: y +- radius * tilt stays in the gap '
+        'range, and a platen that rests is held level; 0 stops y alone, the radius to the movers '
+        'stops each gap',
+    )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class DisturbanceParameters:
+    """Forces and torques by axis: constant + amplitude·sin(2π·frequency·t + phase)."""
+
+    constant: tuple[float, ...] = parameter(
+        (0.0, 0.0, 0.0, 0.0, 0.0),
+        unit='N, N m',
+        lower=-1e4,
+        upper=1e4,
+        length=5,
+        description='constant part' + _BY_AXIS,
+    )
+    amplitude: tuple[float, ...] = parameter(
+        (0.0, 0.0, 0.0, 0.0, 0.0),
+        unit='N, N m',
+        lower=-1e4,
+        upper=1e4,
+        length=5,
+        description='amplitude of the sinusoid' + _BY_AXIS,
+    )
+    frequency: tuple[float, ...] = parameter(
+        (0.75, 0.75, 0.75, 0.75, 0.75),
+        unit='Hz',
+        lower=0.0,
+        upper=500.0,
+        length=5,
+        description='frequency of the sinusoid' + _BY_AXIS,
+    )
+    phase: tuple[float, ...] = parameter(
+        (0.0, 0.0, 0.0, 0.0, 0.0),
+        unit='rad',
+        lower=-10.0,
+        upper=10.0,
+        length=5,
+        description='phase of the sinusoid at sample 0' + _BY_AXIS,
+    )
+
+
+def _factor(name: str) -> Any:
+    return parameter(1.0, lower=0.1, upper=10.0, description=f"the plant's {name} by the machine's")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class OffsetParameters:
+    """How the true plant differs from the machine that the controller knows, as factors."""
+
+    K_v1: float = _factor('K_v1')
+    K_v2: float = _factor('K_v2')
+    K_v3: float = _factor('K_v3')
+    K_h: float = _factor('K_h')
+    mass_x: float = _factor('mass_x')
+    mass_z: float = _factor('mass_z')
+    mass_y: float = _factor('mass_y')
+    inertia: float = _factor('inertia')
+    spring_phi: float = _factor('spring_phi')
+    spring_theta: float = _factor('spring_theta')
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class InitialParameters:
+    """Where the platen is at sample 0."""
+
+    position: tuple[float, ...] = parameter(
+        (0.031, 0.0, 0.0, 0.0, 0.0),
+        unit='m, rad',
+        lower=-1.0,
+        upper=1.0,
+        length=5,
+        description='position' + _BY_AXIS,
+    )
+    velocity: tuple[float, ...] = parameter(
+        (0.0, 0.0, 0.0, 0.0, 0.0),
+        unit='m/s, rad/s',
+        lower=-10.0,
+        upper=10.0,
+        length=5,
+        description='velocity' + _BY_AXIS,
+    )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class PlantParameters:
+    """The simulated stage."""
+
+    sample_time: float = parameter(
+        1e-3, unit='s', lower=1e-4, upper=1e-2, description='time between samples'
+    )
+    substeps: int = parameter(
+        2, lower=1, upper=1000, description='Runge-Kutta steps of fourth order per sample'
+    )
+    seed: int = parameter(0, lower=0, upper=2**31 - 1, description='seed of the encoder noise')
+    machine: MachineParameters = group(MachineParameters)
+    amplifier: AmplifierParameters = group(AmplifierParameters)
+    encoder: EncoderParameters = group(EncoderParameters)
+    guide: GuideParameters = group(GuideParameters)
+    stop: StopParameters = group(StopParameters)
+    disturbance: DisturbanceParameters = group(DisturbanceParameters)
+    offset: OffsetParameters = group(OffsetParameters)
+    initial: InitialParameters = group(InitialParameters)
+
+    def __post_init__(self) -> None:
+        """Refuse a start outside the stops and steps too long for the friction."""
+        self._check_initial()
+        self._check_substeps()
+
+    def _check_initial(self) -> None:
+        position = self.initial.position
+        limits = zip(
+            AXES, position, self.machine.lower_limit, self.machine.upper_limit, strict=True
+        )
+        for axis, value, lower, upper in limits:
+            if not lower <= value <= upper:
+                raise ParameterError(
+                    f"parameter 'initial.position' puts {axis} at {value:g}, outside its stops "
+                    f'[{lower:g}, {upper:g}]'
+                )
+        reach = self.stop.seat_radius * max(abs(position[3]), abs(position[4]))
+        y = position[0]
+        if y + reach > self.machine.gap_max or y - reach < self.machine.gap_min:
+            raise ParameterError(
+                f"parameter 'initial.position' tilts the platen into a vertical stop: y is {y:g} m "
+                f'and its seats reach {reach:g} m further'
+            )
+
+    def _check_substeps(self) -> None:
+        guide = self.guide
+        friction = zip(guide.coulomb, guide.coulomb_velocity, guide.viscous, strict=True)
+        rates = [coulomb / velocity + viscous for coulomb, velocity, viscous in friction]
+        needed = math.ceil(max(rates) * self.sample_time / _LONGEST_STEP)
+        if self.substeps < needed:
+            raise ParameterError(
+                f"parameter 'substeps' is {self.substeps}, the friction of "
+                f'{AXES[rates.index(max(rates))]} needs at least {needed}'
+            )

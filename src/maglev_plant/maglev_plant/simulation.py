@@ -1,0 +1,188 @@
+"""The simulated stage: reads like the machine's encoders, takes the currents of its motors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from maglev_node.stage import EncoderSample
+from maglev_plant.arrays import (
+    FLOWING,
+    LOAD,
+    SAMPLE,
+    STATE,
+    FloatArray,
+    StageArrays,
+    initial_memory,
+    stage_arrays,
+)
+from maglev_plant.compiled import compiled
+from maglev_plant.dynamics import advance
+from maglev_plant.encoder import encode
+from maglev_plant.parameters import PlantParameters
+
+_DIRECT, _QUADRATURE = 'direct_current', 'quadrature_current'
+
+
+class Trajectory(NamedTuple):
+    """A simulated run, one row per sample."""
+
+    time: FloatArray  # (n,) [s]
+    state: FloatArray  # (n, 10) x1..x10
+    measured: FloatArray  # (n, 6) gaps of motors 1..4, x, z [m]
+    direct_current: FloatArray  # (n, 4) flowing [A]
+    quadrature_current: FloatArray  # (n, 4) flowing [A]
+
+
+@compiled
+def _read(
+    scalars: FloatArray,
+    axes: FloatArray,
+    memory: FloatArray,
+    command: FloatArray,
+    reading: FloatArray,
+    first: bool,
+) -> None:
+    if not first:
+        advance(scalars, axes, memory, command)
+    encode(scalars, memory, reading)
+
+
+@compiled
+def _hold(i_d: FloatArray, i_q: FloatArray, command: FloatArray) -> bool:
+    """Take over finite currents as the command, or leave it and return false."""
+    for i in range(4):
+        if not (np.isfinite(i_d[i]) and np.isfinite(i_q[i])):
+            return False
+    for i in range(4):
+        command[i] = i_d[i]
+        command[4 + i] = i_q[i]
+    return True
+
+
+class SimulatedStage:
+    """The stage in simulation, one sample per :meth:`read`.
+
+    The first ``read`` gives sample 0 at the initial state. Each further one carries the plant over
+    one sample time with the currents last written held, and gives what the encoders read then.
+    Before anything is written no current flows.
+    """
+
+    def __init__(self, parameters: PlantParameters | None = None) -> None:
+        self.parameters = parameters or PlantParameters()
+        self._arrays = stage_arrays(self.parameters)
+        self._first = True
+
+    @property
+    def arrays(self) -> StageArrays:
+        """The stage's own arrays, for compiled loops that call ``advance`` and ``encode``."""
+        return self._arrays
+
+    @property
+    def sequence(self) -> int:
+        """Number of the sample the plant stands at."""
+        return int(self._arrays.memory[SAMPLE])
+
+    @property
+    def state(self) -> FloatArray:
+        """True x1..x10 [m, m/s, rad, rad/s], shape (10,), a copy."""
+        return np.array(self._arrays.memory[STATE : STATE + 10])
+
+    @property
+    def direct_current(self) -> FloatArray:
+        """i_d flowing in motors 1..4 [A], shape (4,), a copy."""
+        return np.array(self._arrays.memory[FLOWING : FLOWING + 4])
+
+    @property
+    def quadrature_current(self) -> FloatArray:
+        """i_q flowing in motors 1..4 [A], shape (4,), a copy."""
+        return np.array(self._arrays.memory[FLOWING + 4 : FLOWING + 8])
+
+    @property
+    def thermal_load(self) -> FloatArray:
+        """Used share of the thermal budget of motors 1..4, each its hottest phase, shape (4,)."""
+        load: FloatArray = self._arrays.memory[LOAD : LOAD + 12].reshape(4, 3).max(axis=1)
+        return load
+
+    def read(self) -> EncoderSample:
+        """The next sample; see the class."""
+        arrays = self._arrays
+        reading = np.empty(6)
+        _read(arrays.scalars, arrays.axes, arrays.memory, arrays.command, reading, self._first)
+        self._first = False
+        return EncoderSample(reading[:4], reading.item(4), reading.item(5))
+
+    def write(self, direct_current: ArrayLike, quadrature_current: ArrayLike) -> None:
+        """Hold these currents until the next write.
+
+        ``direct_current`` i_d, ``quadrature_current`` i_q of motors 1..4 [A], shape (4,) each.
+        Raises ValueError, and holds what was written before, when a shape is wrong or a current is
+        not finite.
+        """
+        i_d = _currents(_DIRECT, direct_current)
+        i_q = _currents(_QUADRATURE, quadrature_current)
+        if not _hold(i_d, i_q, self._arrays.command):
+            raise ValueError(_not_finite(i_d, i_q))
+
+    def reset(self) -> None:
+        """Go back to sample 0 and the initial state, without current, amplifiers cold."""
+        self._arrays.memory[:] = initial_memory(self.parameters)
+        self._arrays.command[:] = 0.0
+        self._first = True
+
+    def close(self) -> None:
+        """Take the currents away."""
+        self._arrays.command[:] = 0.0
+
+
+def _currents(name: str, value: Any) -> NDArray[np.float64]:
+    if type(value) is np.ndarray and value.dtype == np.float64 and value.shape == (4,):
+        return value
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f'{name} must be four numbers [A], not {value!r}') from error
+    if array.shape != (4,):
+        raise ValueError(f'{name} must have shape (4,), one current per motor, not {array.shape}')
+    return np.ascontiguousarray(array)
+
+
+def _not_finite(i_d: FloatArray, i_q: FloatArray) -> str:
+    for name, values in ((_DIRECT, i_d), (_QUADRATURE, i_q)):
+        for motor, value in enumerate(values, start=1):
+            if not np.isfinite(value):
+                return f'{name} of motor {motor} is {value}, it must be finite'
+    return 'currents must be finite'
+
+
+def simulate(
+    parameters: PlantParameters,
+    law: Callable[[EncoderSample], tuple[ArrayLike, ArrayLike]],
+    duration: float,
+) -> Trajectory:
+    """Run the stage in closed loop with a control law, from sample 0 for ``duration`` [s].
+
+    ``law`` takes an :class:`EncoderSample` and returns i_d and i_q of motors 1..4 [A], shape (4,)
+    each. Row k of the result is sample k; its currents flowed at the instant it was taken.
+    """
+    stage = SimulatedStage(parameters)
+    samples = round(duration / parameters.sample_time) + 1
+    run = Trajectory(
+        time=np.arange(samples, dtype=np.float64) * parameters.sample_time,
+        state=np.empty((samples, 10)),
+        measured=np.empty((samples, 6)),
+        direct_current=np.empty((samples, 4)),
+        quadrature_current=np.empty((samples, 4)),
+    )
+    for k in range(samples):
+        sample = stage.read()
+        run.state[k] = stage.state
+        run.measured[k, :4] = sample.gap
+        run.measured[k, 4:] = sample.x, sample.z
+        run.direct_current[k] = stage.direct_current
+        run.quadrature_current[k] = stage.quadrature_current
+        stage.write(*law(sample))
+    return run
