@@ -1,0 +1,128 @@
+"""Whether a reference can be followed: position, gap at every motor, speed, acceleration, jumps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from maglev_node.parameters import ParameterError
+from maglev_reference.geometry import AXES, UNITS, FloatArray, motor_gaps
+from maglev_reference.parameters import Limits
+from maglev_reference.profiles import Kinematics
+
+_SLACK = 1e-6  # share of a range that rounding may take
+_MOTORS = tuple(f'the gap at motor {motor}' for motor in range(1, 5))
+
+
+class UnreachableError(ParameterError):
+    """A reference leaves the limits; the message names axis, value, bound and time."""
+
+
+def check_samples(
+    samples: Kinematics,
+    first_time: float,
+    sample_time: float,
+    limits: Limits,
+    jumps: npt.NDArray[np.bool_] | None = None,
+) -> None:
+    """Refuse samples (n, 5) that leave the limits.
+
+    They are ``sample_time`` [s] apart, the first at ``first_time`` [s]; ``jumps`` (n,) marks those
+    at which the position may jump from the sample before. Raises :class:`UnreachableError` for the
+    first offence of a kind, in time.
+    """
+    time = first_time + sample_time * np.arange(len(samples.position), dtype=np.float64)
+    checks = (
+        ('{}', '', limits.lower, limits.upper),
+        ('the speed of {}', '/s', [-v for v in limits.velocity], limits.velocity),
+        ('the acceleration of {}', '/s^2', [-a for a in limits.acceleration], limits.acceleration),
+    )
+    for values, (name, per_time, lower, upper) in zip(samples, checks, strict=True):
+        names = [name.format(axis) for axis in AXES]
+        units = [unit + per_time for unit in UNITS]
+        _within(values, np.array(lower), np.array(upper), time, names, units)
+    gaps = motor_gaps(samples.position, limits.radius)
+    low, high = limits.motor_gap
+    _within(gaps, np.full(4, low), np.full(4, high), time, _MOTORS, ('m',) * 4)
+    _check_slew(samples.position, time, sample_time, limits, jumps)
+
+
+def utilisation(samples: Kinematics, limits: Limits) -> float:
+    """The largest share of any limit that samples (n, 5) use; up to 1 they are within."""
+    lower, upper = np.array(limits.lower), np.array(limits.upper)
+    gaps = motor_gaps(samples.position, limits.radius)
+    low, high = limits.motor_gap
+    shares = (
+        np.abs(samples.position - 0.5 * (lower + upper)) / (0.5 * (upper - lower)),
+        np.abs(gaps - 0.5 * (low + high)) / (0.5 * (high - low)),
+        np.abs(samples.velocity) / np.array(limits.velocity),
+        np.abs(samples.acceleration) / np.array(limits.acceleration),
+    )
+    return max(float(share.max()) for share in shares)
+
+
+def within(share: float) -> bool:
+    """Whether a :func:`utilisation` is within limits, rounding aside."""
+    return share <= 1.0 + _SLACK
+
+
+def check_rest(position: FloatArray, gap: float, tolerance: float, limits: Limits) -> None:
+    """Refuse to lift off from a position (5,) [m, rad] that is not at rest on the lower stop.
+
+    ``gap`` is the gap there [m]. Raises :class:`UnreachableError`.
+    """
+    if not np.isfinite(position).all():
+        raise UnreachableError(f'unreachable reference: rest position {position} is not finite')
+    if abs(position[0] - gap) > tolerance:
+        raise UnreachableError(
+            f'lift-off refused: the platen is at a gap of {1e3 * position[0]:.3f} mm, not on its '
+            f'lower stop at {1e3 * gap:.3f} mm; lower it by hand or correct lift_off.rest_gap'
+        )
+    samples = Kinematics(position[None, :], np.zeros((1, 5)), np.zeros((1, 5)))
+    check_samples(samples, 0.0, 1.0, limits)
+
+
+def _within(
+    values: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    time: FloatArray,
+    names: Sequence[str],
+    units: Sequence[str],
+) -> None:
+    slack = _SLACK * (upper - lower)
+    good = np.isfinite(values) & (values >= lower - slack) & (values <= upper + slack)
+    if good.all():
+        return
+    row, column = np.argwhere(~good)[0]
+    bound = f'lie in [{lower[column]:g}, {upper[column]:g}]'
+    if not np.isfinite(values[row, column]):
+        bound = 'be finite'
+    raise UnreachableError(
+        f'unreachable reference: {names[column]} is {values[row, column]:.6g} {units[column]} at '
+        f'{time[row]:.3f} s, it must {bound} {units[column]}'
+    )
+
+
+def _check_slew(
+    position: FloatArray,
+    time: FloatArray,
+    sample_time: float,
+    limits: Limits,
+    jumps: npt.NDArray[np.bool_] | None,
+) -> None:
+    change = np.diff(position, axis=0)
+    bound = np.array(limits.velocity) * sample_time
+    bad = np.abs(change) > bound * (1.0 + _SLACK) + 1e-12
+    if jumps is not None:
+        bad &= ~jumps[1:, None]
+    if not bad.any():
+        return
+    row, column = np.argwhere(bad)[0]
+    raise UnreachableError(
+        f'unreachable reference: {AXES[column]} jumps by {change[row, column]:.6g} {UNITS[column]} '
+        f'in one sample at {time[row + 1]:.3f} s, it must stay within {bound[column]:g} '
+        f'{UNITS[column]}'
+    )

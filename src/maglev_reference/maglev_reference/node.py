@@ -1,0 +1,216 @@
+"""The reference node: publishes where the platen shall be, some samples ahead of the stage."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from std_srvs.srv import Trigger
+
+from maglev_msgs.msg import Measurement, Reference
+from maglev_node.node import MaglevNode, SourceParameters
+from maglev_node.node import main as run_main
+from maglev_node.parameters import parameter
+from maglev_node.polling import Queues
+from maglev_node.stamp import stamp_now
+from maglev_node.topics import MEASUREMENT, REFERENCE, sample_qos
+from maglev_reference.check import UnreachableError
+from maglev_reference.geometry import outputs
+from maglev_reference.parameters import ReferenceParameters
+from maglev_reference.segments import Phase
+from maglev_reference.timeline import Timeline
+
+_BURST = 128  # messages at one poll; half of what a reader's queue holds
+_REMINDER = 5.0  # between two lines about what is waited for [s]
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class ReferenceNodeParameters(SourceParameters, ReferenceParameters):
+    """The reference and how it is published."""
+
+    autostart: bool = parameter(
+        True, description='start by itself; false: by ~/lift_off', read_only=True
+    )
+    exit_at_end: bool = parameter(
+        False, description='end the process when the run is over', read_only=True
+    )
+    lead: int = parameter(
+        64,
+        description='how far the reference is published ahead',
+        unit='samples',
+        lower=1,
+        upper=200,
+        read_only=True,
+    )
+    poll_period: float = parameter(
+        0.004,
+        description='how often the newest measurement is looked at, wall clock',
+        unit='s',
+        lower=0.0005,
+        upper=0.1,
+        read_only=True,
+    )
+    timeout: float = parameter(
+        1.0,
+        description='longest time without a measurement while running, wall clock',
+        unit='s',
+        lower=0.05,
+        upper=600.0,
+        read_only=True,
+    )
+
+
+class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
+    """Publishes ``/reference`` up to ``lead`` samples ahead of the newest measurement.
+
+    It looks at the newest measurement on a short timer instead of being woken by each one. The
+    first measurement seen once all subscribers are there tells where the platen rests and becomes
+    sample 0 of the timeline.
+    """
+
+    def __init__(self) -> None:
+        super().__init__('reference', ReferenceNodeParameters)
+        Timeline(self.parameters)  # refuses what cannot be followed before anything is waited for
+        self.claim(REFERENCE, 'reference')
+        self._timeline: Timeline | None = None
+        self._expected = self.parameters.watchers + 1  # and the controller
+        self._origin = 0  # the stage's sequence at the timeline's sample 0
+        self._next = 0  # the timeline's first sample not yet published
+        self._newest = 0  # the stage's newest sequence
+        self._phase = Phase.REST
+        self._seen = self._reminded = time.monotonic()
+        self._message = Reference()
+        self._message.header.frame_id = 'stage'
+        self._publisher = self.create_publisher(Reference, REFERENCE, sample_qos())
+        self._queues = Queues(self)
+        self._measurements = self._queues.subscribe(MEASUREMENT, Measurement, depth=1)
+        self.create_service(Trigger, '~/lift_off', self._lift_off)
+        self.create_service(Trigger, '~/land', self._land)
+        self.create_timer(self.parameters.poll_period, self._poll, clock=self.steady_clock)
+
+    def _poll(self) -> None:
+        measurement = None
+        for message, _ in self._measurements.take(1):
+            measurement = message
+        if measurement is not None:
+            self._seen = time.monotonic()
+            self._newest = int(measurement.sequence)
+        if self._timeline is None:
+            self._wait(measurement)
+        elif measurement is None:
+            self._watch(self._timeline)
+        if self._timeline is not None:
+            self._publish(self._timeline)
+            self._follow_phase(self._timeline)
+
+    def _wait(self, measurement: Measurement | None) -> None:
+        if measurement is not None and self._listeners() >= self._expected:
+            self._start(measurement)
+        elif time.monotonic() - self._reminded > _REMINDER:
+            self._reminded = time.monotonic()
+            self.get_logger().info(self._waiting_for())
+
+    def _listeners(self) -> int:
+        return int(self._publisher.get_subscription_count())
+
+    def _waiting_for(self) -> str:
+        there = self._listeners()
+        if there < self._expected:
+            return f'waiting for {self._expected} subscribers of {REFERENCE}, {there} are there'
+        return f'waiting for a stage on {MEASUREMENT}'
+
+    def _start(self, measurement: Measurement) -> None:
+        try:
+            rest = outputs(
+                measurement.gap, measurement.x, measurement.z, self.parameters.limits.radius
+            )
+            self._timeline = Timeline(self.parameters, rest, self.parameters.autostart)
+        except UnreachableError as error:
+            self.fail(str(error))
+        except ValueError as error:
+            self.fail(f'lift-off refused: {error}; check the encoders')
+        else:
+            self._origin = self._newest
+            start = 'starting' if self.parameters.autostart else 'resting until ~/lift_off'
+            self.get_logger().info(f'{start} at sample {self._origin}')
+
+    def _publish(self, timeline: Timeline) -> None:
+        wanted = self._newest + self.parameters.lead - self._origin
+        count = min(wanted - self._next, _BURST)
+        if count <= 0:
+            return
+        block = timeline.block(self._next, count)
+        message = self._message
+        stamp_now(message.header.stamp)
+        first = self._origin + self._next
+        for row in range(count):
+            message.sequence = first + row
+            message.phase = int(block.phase[row])
+            message.segment = int(block.segment[row])
+            message.position = block.position[row]
+            message.velocity = block.velocity[row]
+            message.acceleration = block.acceleration[row]
+            message.target = block.target[row]
+            self._publisher.publish(message)
+        self._next += count
+
+    def _follow_phase(self, timeline: Timeline) -> None:
+        """Say what the stage is asked to do now, and end where that is wanted."""
+        sample = self._newest - self._origin
+        phase = timeline.phase(sample)
+        if phase != self._phase:
+            self._phase = phase
+            self.get_logger().info(f'{phase.name} at sample {self._newest}')
+        if self.parameters.exit_at_end and phase == Phase.END and sample > (timeline.end or 0):
+            self.finish(0)
+
+    def _watch(self, timeline: Timeline) -> None:
+        silent = time.monotonic() - self._seen
+        if silent < self.parameters.timeout:
+            return
+        if self._phase == Phase.END:
+            self.finish(0)
+            return
+        who = 'the stage, or the controller it waits for, has stopped'
+        if self._measurements.publisher_count() == 0:
+            who = 'the stage is gone'
+        self.fail(f'no measurement for {silent:.1f} s after sample {self._newest}: {who}')
+
+    def _lift_off(self, _request: Any, response: Any) -> Any:
+        if self._timeline is None:
+            response.success, response.message = False, self._waiting_for()
+        else:
+            response.success = self._timeline.lift_off(self._next)
+            response.message = 'lifting off' if response.success else 'the reference is running'
+        return response
+
+    def _land(self, _request: Any, response: Any) -> Any:
+        if self._timeline is None:
+            response.success, response.message = False, self._waiting_for()
+        else:
+            response.success = self._timeline.land(self._next)
+            response.message = 'landing' if response.success else 'landing already, or landed'
+        return response
+
+    def diagnose(self) -> tuple[bytes, str, Mapping[str, object]]:
+        """WARN while something is waited for."""
+        if self._timeline is None:
+            return DiagnosticStatus.WARN, self._waiting_for(), {}
+        facts = {
+            'phase': self._phase.name,
+            'sequence': self._newest,
+            'ahead': self._origin + self._next - 1 - self._newest,
+        }
+        return DiagnosticStatus.OK, 'running', facts
+
+    def close(self) -> None:
+        """The queue is given up; the controller lands by itself when the reference ends."""
+        self._queues.destroy()
+
+
+def main() -> None:
+    """Entry point of the executable ``reference``."""
+    run_main(ReferenceNode, 'reference')

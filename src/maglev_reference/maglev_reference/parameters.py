@@ -1,0 +1,291 @@
+"""The reference's parameters: what to follow, how to get there and back, within which limits."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+from maglev_node.parameters import ParameterError, group, parameter
+from maglev_reference.geometry import AXES
+
+OMEGA_0 = 1.5 * math.pi  # the paper's w_0 [rad/s]
+TRAJECTORIES = ('hold', 'sinusoids', 'steps')
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Limits:
+    """What is refused before moving. Arrays are in the order y, x, z, phi, theta.
+
+    The gap at a motor includes the tilt, (5). The paper gives its upper end as 31 mm for the platen
+    and 33 mm for the motors; its 4DOF ellipse needs 31.4 mm at motors 2 and 4.
+    """
+
+    lower: tuple[float, ...] = parameter(
+        (0.018, -0.05, -0.05, -0.003, -0.014),
+        description='least position of each output',
+        unit='m, rad',
+        lower=-0.1,
+        upper=0.1,
+        length=5,
+    )
+    upper: tuple[float, ...] = parameter(
+        (0.031, 0.05, 0.05, 0.003, 0.014),
+        description='greatest position of each output',
+        unit='m, rad',
+        lower=-0.1,
+        upper=0.1,
+        length=5,
+    )
+    motor_gap: tuple[float, ...] = parameter(
+        (0.018, 0.033),
+        description='least and greatest air gap at each motor, tilt included',
+        unit='m',
+        lower=0.01,
+        upper=0.1,
+        length=2,
+    )
+    velocity: tuple[float, ...] = parameter(
+        (0.2, 1.0, 1.0, 0.1, 0.5),
+        description='greatest speed of each output',
+        unit='m/s, rad/s',
+        lower=1e-4,
+        upper=10.0,
+        length=5,
+    )
+    acceleration: tuple[float, ...] = parameter(
+        (5.0, 15.0, 15.0, 5.0, 20.0),
+        description='greatest acceleration of each output',
+        unit='m/s^2, rad/s^2',
+        lower=1e-3,
+        upper=100.0,
+        length=5,
+    )
+    step: tuple[float, ...] = parameter(
+        (0.01, 0.06, 0.06, 0.006, 0.02),
+        description='greatest step of each output',
+        unit='m, rad',
+        lower=0.0,
+        upper=0.1,
+        length=5,
+    )
+    radius: float = parameter(
+        0.397,
+        description='r, from the centre of the platen to the centre of a motor',
+        unit='m',
+        lower=0.05,
+        upper=2.0,
+    )
+
+    def __post_init__(self) -> None:
+        for axis, lower, upper in zip(AXES, self.lower, self.upper, strict=True):
+            if not lower < upper:
+                raise ParameterError(
+                    f"parameter 'limits.lower' is {lower:g} for {axis}, it must be below "
+                    f"'limits.upper', {upper:g}"
+                )
+        if not self.motor_gap[0] < self.motor_gap[1]:
+            raise ParameterError(f"parameter 'limits.motor_gap' is {self.motor_gap}, it must rise")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class TiltSinusoids:
+    """offset + sum_i amplitude_i sin(frequency_i t + phase_i); t = 0 as measuring starts."""
+
+    offset: float = parameter(
+        0.0, description='mean position', unit='rad', lower=-0.014, upper=0.014
+    )
+    amplitude: tuple[float, ...] = parameter(
+        (0.0,),
+        description='amplitude of each sinusoid',
+        unit='rad',
+        lower=-0.014,
+        upper=0.014,
+    )
+    frequency: tuple[float, ...] = parameter(
+        (OMEGA_0,),
+        description='angular frequency of each sinusoid',
+        unit='rad/s',
+        lower=0.01,
+        upper=200.0,
+    )
+    phase: tuple[float, ...] = parameter(
+        (0.0,),
+        description='phase of each sinusoid',
+        unit='rad',
+        lower=-2.0 * math.pi,
+        upper=2.0 * math.pi,
+    )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class GapSinusoids(TiltSinusoids):
+    """The same for the air gap y."""
+
+    offset: float = parameter(
+        0.025, description='mean position', unit='m', lower=0.018, upper=0.031
+    )
+    amplitude: tuple[float, ...] = parameter(
+        (0.0,),
+        description='amplitude of each sinusoid',
+        unit='m',
+        lower=-0.0065,
+        upper=0.0065,
+    )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class TravelSinusoids(TiltSinusoids):
+    """The same for a displacement, x or z."""
+
+    offset: float = parameter(0.0, description='mean position', unit='m', lower=-0.05, upper=0.05)
+    amplitude: tuple[float, ...] = parameter(
+        (0.0,),
+        description='amplitude of each sinusoid',
+        unit='m',
+        lower=-0.05,
+        upper=0.05,
+    )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class SinusoidParameters:
+    """Sums of sinusoids, a group for each axis."""
+
+    y: GapSinusoids = group(GapSinusoids)
+    x: TravelSinusoids = group(TravelSinusoids)
+    z: TravelSinusoids = group(TravelSinusoids)
+    phi: TiltSinusoids = group(TiltSinusoids)
+    theta: TiltSinusoids = group(TiltSinusoids)
+
+    def axes(self) -> tuple[TiltSinusoids, ...]:
+        """The five groups in output order."""
+        return (self.y, self.x, self.z, self.phi, self.theta)
+
+    def __post_init__(self) -> None:
+        for name, axis in zip(AXES, self.axes(), strict=True):
+            lengths = (len(axis.amplitude), len(axis.frequency), len(axis.phase))
+            _same_length(f'sinusoids.{name}', ('amplitude', 'frequency', 'phase'), lengths)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class StepParameters:
+    """A sequence of steps, each of one axis from start to target; the other axes stay at home."""
+
+    axis: tuple[str, ...] = parameter(('y',), description='the axis of each step', choices=AXES)
+    start: tuple[float, ...] = parameter(
+        (0.02,), description='where each step begins', unit='m, rad', lower=-0.05, upper=0.05
+    )
+    target: tuple[float, ...] = parameter(
+        (0.027,), description='where each step ends', unit='m, rad', lower=-0.05, upper=0.05
+    )
+    settle: float = parameter(
+        2.0, description='rest before each step', unit='s', lower=0.0, upper=60.0
+    )
+    shaped: bool = parameter(True, description='minimum-jerk steps; false: the reference jumps')
+    shaping_time: float = parameter(
+        0.2, description='time of a shaped step', unit='s', lower=0.01, upper=10.0
+    )
+
+    def __post_init__(self) -> None:
+        lengths = (len(self.axis), len(self.start), len(self.target))
+        _same_length('steps', ('axis', 'start', 'target'), lengths)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class LiftOffParameters:
+    """From the lower stop to the home position."""
+
+    wait: float = parameter(
+        0.2, description='rest on the stop before lift-off', unit='s', lower=0.001, upper=60.0
+    )
+    time: float = parameter(1.5, description='time of lift-off', unit='s', lower=0.1, upper=60.0)
+    settle: float = parameter(
+        1.0, description='hold after lift-off', unit='s', lower=0.0, upper=60.0
+    )
+    rest_gap: float = parameter(
+        0.031, description='gap on the lower stop', unit='m', lower=0.018, upper=0.1
+    )
+    rest_tolerance: float = parameter(
+        0.001,
+        description='how far from rest_gap the platen may be found before lift-off',
+        unit='m',
+        lower=0.0,
+        upper=0.05,
+    )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class LandingParameters:
+    """From any position down to the lower stop, the last part at crawling speed."""
+
+    brake_time: float = parameter(
+        0.5,
+        description='time to come to rest when told to land while moving',
+        unit='s',
+        lower=0.05,
+        upper=10.0,
+    )
+    time: float = parameter(2.0, description='time of the descent', unit='s', lower=0.1, upper=60.0)
+    crawl_distance: float = parameter(
+        0.0005, description='last part of the descent', unit='m', lower=1e-5, upper=0.005
+    )
+    crawl_speed: float = parameter(
+        0.001, description='speed where the last part begins', unit='m/s', lower=1e-4, upper=0.01
+    )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class ReferenceParameters:
+    """The reference node's table."""
+
+    sample_time: float = parameter(
+        0.001, description='time from one sample to the next', unit='s', lower=1e-4, upper=0.01
+    )
+    trajectory: str = parameter(
+        'sinusoids', description='what is followed while measured', choices=TRAJECTORIES
+    )
+    duration: float = parameter(
+        60.0,
+        description='measured time: of the tracking window, or of each step',
+        unit='s',
+        lower=0.01,
+        upper=36000.0,
+    )
+    run_in: float = parameter(
+        8.0,
+        description='time on the trajectory before the tracking window, so that transients decay',
+        unit='s',
+        lower=0.0,
+        upper=600.0,
+    )
+    home: tuple[float, ...] = parameter(
+        (0.025, 0.0, 0.0, 0.0, 0.0),
+        description='where the platen hovers: y, x, z, phi, theta',
+        unit='m, rad',
+        lower=-0.05,
+        upper=0.05,
+        length=5,
+    )
+    move_time: float = parameter(
+        1.0,
+        description='time of moves to and from what is measured; longer where limits need it',
+        unit='s',
+        lower=0.05,
+        upper=60.0,
+    )
+    lift_off: LiftOffParameters = group(LiftOffParameters)
+    sinusoids: SinusoidParameters = group(SinusoidParameters)
+    steps: StepParameters = group(StepParameters)
+    landing: LandingParameters = group(LandingParameters)
+    limits: Limits = group(Limits)
+
+
+def _same_length(where: str, names: Sequence[str], lengths: Sequence[int]) -> None:
+    if len(set(lengths)) > 1 or lengths[0] == 0:
+        listed = ', '.join(
+            f"'{name}' {length}" for name, length in zip(names, lengths, strict=True)
+        )
+        raise ParameterError(
+            f"parameters of '{where}' need as many elements each, one at least: {listed}"
+        )

@@ -1,0 +1,234 @@
+"""The whole reference from rest to rest, by sample number.
+
+REST on the stop, LIFT_OFF, HOLD at home, a smooth way onto the trajectory and a run-in on it, TRACK
+(or a STEP after another, each from rest), back home, LAND with a crawl at the end, END. Sample 0 is
+the timeline's own first sample; times are sample numbers times the sample time.
+"""
+
+from __future__ import annotations
+
+import bisect
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from maglev_reference.check import check_rest, check_samples
+from maglev_reference.geometry import FloatArray, Y
+from maglev_reference.parameters import ReferenceParameters
+from maglev_reference.profiles import Kinematics, State
+from maglev_reference.segments import Phase, Planner, Segment
+
+_CHUNK = 256  # samples evaluated together, so that a value does not depend on who asks for how many
+_CHECKED_TOGETHER = 65536
+
+
+class Block(NamedTuple):
+    """Consecutive samples of the reference, in output order y, x, z, phi, theta."""
+
+    phase: npt.NDArray[np.uint8]  # (n,)
+    segment: npt.NDArray[np.uint32]  # (n,)
+    position: FloatArray  # (n, 5) [m, rad]
+    velocity: FloatArray  # (n, 5) [m/s, rad/s]
+    acceleration: FloatArray  # (n, 5) [m/s^2, rad/s^2]
+    target: FloatArray  # (n, 5) [m, rad]
+
+    @classmethod
+    def empty(cls, count: int) -> Block:
+        """Room for ``count`` samples."""
+        return cls(
+            np.empty(count, dtype=np.uint8),
+            np.empty(count, dtype=np.uint32),
+            *(np.empty((count, 5)) for _ in range(4)),
+        )
+
+    @classmethod
+    def joined(cls, blocks: Sequence[Block]) -> Block:
+        """Blocks one after another."""
+        columns: Any = zip(*blocks, strict=True)
+        return cls(*(np.concatenate(column) for column in columns))
+
+    def rows(self, rows: slice) -> Block:
+        """Some of the samples, without a copy."""
+        columns: Any = self
+        return Block(*(column[rows] for column in columns))
+
+
+class Timeline:
+    """The reference at any sample n >= 0.
+
+    ``rest`` (5,) is where the platen was found at rest; without it, the middle of the lower stop.
+    With ``autostart`` false it rests until :meth:`lift_off`. The whole reference is checked here,
+    before anything moves: raises UnreachableError (a ParameterError) where it leaves the limits.
+    """
+
+    def __init__(
+        self,
+        parameters: ReferenceParameters,
+        rest: FloatArray | None = None,
+        autostart: bool = True,
+    ) -> None:
+        self._parameters = parameters
+        start = self._rest_position(rest)
+        self._cached_chunk = -1
+        self._cache: Block | None = None
+        planner = self._full_plan(State.at_rest(start), 0, 0)
+        self._adopt(planner.segments)
+        self._check()
+        if not autostart:
+            planner = Planner(parameters, 0, 0, State.at_rest(start))
+            planner.rest()
+            self._adopt(planner.segments)
+
+    @property
+    def segments(self) -> tuple[Segment, ...]:
+        """The segments in order; the last one has no end."""
+        return tuple(self._segments)
+
+    @property
+    def end(self) -> int | None:
+        """The sample at which END begins; None while resting without a start."""
+        last = self._segments[-1]
+        return last.first if last.phase == Phase.END else None
+
+    def phase(self, sample: int) -> Phase:
+        """The phase at a sample."""
+        return self._segments[self._index(sample)].phase
+
+    def block(self, first: int, count: int) -> Block:
+        """Samples ``first`` to ``first + count - 1``. Raises ValueError for a negative sample.
+
+        However a range is cut into blocks, its values are the same to the last bit.
+        """
+        if first < 0 or count < 0:
+            raise ValueError(f'no samples {first} to {first + count - 1}: they count up from 0')
+        pieces = []
+        sample = first
+        while True:
+            chunk, offset = divmod(sample, _CHUNK)
+            take = min(_CHUNK - offset, first + count - sample)
+            source = self._chunk(chunk)
+            pieces.append(source.rows(slice(offset, offset + take)))
+            sample += take
+            if sample >= first + count:
+                break
+        if len(pieces) == 1:
+            return pieces[0]
+        return Block.joined(pieces)
+
+    def lift_off(self, first: int) -> bool:
+        """Start from rest at sample ``first``, the first time or after a landing.
+
+        Returns False when it has started already.
+        """
+        segment = self._segments[self._index(first)]
+        if segment.samples is not None:
+            return False
+        state = State.at_rest(segment.target)
+        planner = self._full_plan(state, first, segment.number + 1)
+        self._replace(first, planner.segments)
+        return True
+
+    def land(self, first: int) -> bool:
+        """From sample ``first`` on, land smoothly from wherever the reference then is, then END.
+
+        Returns False when it has already landed or is about to.
+        """
+        segment = self._segments[self._index(first)]
+        if segment.phase in (Phase.LAND, Phase.END):
+            return False
+        planner = Planner(self._parameters, first, segment.number + 1, self._state_before(first))
+        if segment.phase == Phase.REST:
+            planner.end()
+        else:
+            planner.brake()
+            planner.land()
+        self._replace(first, planner.segments)
+        return True
+
+    def _rest_position(self, rest: FloatArray | None) -> FloatArray:
+        table = self._parameters.lift_off
+        if rest is None:
+            return np.array([table.rest_gap, 0.0, 0.0, 0.0, 0.0])
+        position = np.array(rest, dtype=float)
+        if position.shape != (5,):
+            raise ValueError(f'a rest position has shape (5,), not {position.shape}')
+        upper = self._parameters.limits.upper[Y]
+        if position[Y] > upper and position[Y] - upper <= table.rest_tolerance:
+            position[Y] = upper
+        check_rest(position, table.rest_gap, table.rest_tolerance, self._parameters.limits)
+        return position
+
+    def _full_plan(self, state: State, first: int, number: int) -> Planner:
+        planner = Planner(self._parameters, first, number, state)
+        planner.lift_off()
+        planner.measure()
+        planner.land()
+        return planner
+
+    def _state_before(self, sample: int) -> State:
+        """The state a new segment takes over at ``sample``: of what was there, without its jump."""
+        segment = self._segments[self._index(sample)]
+        if segment.jumps and segment.first == sample:
+            segment = self._segments[self._index(sample - 1)]
+        time = (sample - segment.first) * self._parameters.sample_time
+        found = segment.motion.evaluate(np.array([time]))
+        return State(*(values[0] for values in found))
+
+    def _adopt(self, segments: list[Segment]) -> None:
+        self._segments = list(segments)
+        self._firsts = [segment.first for segment in self._segments]
+        self._cached_chunk = -1
+
+    def _replace(self, first: int, segments: list[Segment]) -> None:
+        kept = [segment for segment in self._segments if segment.first < first]
+        if kept:
+            kept[-1] = kept[-1]._replace(samples=first - kept[-1].first)
+        self._adopt(kept + segments)
+
+    def _index(self, sample: int) -> int:
+        return bisect.bisect_right(self._firsts, sample) - 1
+
+    def _chunk(self, chunk: int) -> Block:
+        if chunk != self._cached_chunk or self._cache is None:
+            self._cache = self._evaluate(chunk * _CHUNK, _CHUNK)
+            self._cached_chunk = chunk
+        return self._cache
+
+    def _evaluate(self, first: int, count: int) -> Block:
+        found = Block.empty(count)
+        index = self._index(first)
+        done = 0
+        while done < count:
+            segment = self._segments[index]
+            sample = first + done
+            take = min(count - done, segment.last - sample + 1)
+            rows = slice(done, done + take)
+            start = sample - segment.first
+            time = np.arange(start, start + take, dtype=np.float64)
+            moved = segment.motion.evaluate(self._parameters.sample_time * time)
+            found.phase[rows] = segment.phase
+            found.segment[rows] = segment.number
+            found.target[rows] = segment.target
+            found.position[rows], found.velocity[rows], found.acceleration[rows] = moved
+            done += take
+            index += 1
+        return found
+
+    def _check(self) -> None:
+        """What is measured first, so that it and not the way to it is found at fault."""
+        end = self._segments[-1].first
+        measured = (Phase.TRACK, Phase.STEP)
+        for segment in sorted(self._segments, key=lambda segment: segment.phase not in measured):
+            self._check_range(max(segment.first - 1, 0), min(segment.last, end) + 1)
+
+    def _check_range(self, first: int, stop: int) -> None:
+        sample_time = self._parameters.sample_time
+        jumps_at = [segment.first for segment in self._segments if segment.jumps]
+        for start in range(first, stop, _CHECKED_TOGETHER):
+            count = min(_CHECKED_TOGETHER + 1, stop - start)  # one more, to see the seam
+            block = self._evaluate(start, count)
+            samples = Kinematics(block.position, block.velocity, block.acceleration)
+            jumps = np.isin(np.arange(start, start + count), jumps_at)
+            check_samples(samples, start * sample_time, sample_time, self._parameters.limits, jumps)
