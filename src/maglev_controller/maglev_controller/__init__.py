@@ -1,0 +1,1 @@
+"""Feedback linearisation and internal-model regulator of the maglev stage, and its node."""

@@ -1,0 +1,106 @@
+"""What the controller does by itself when the reference is lost: brake, descend, rest.
+
+Cutting the current is no way down: below about 28.7 mm the platen would be pulled up into the
+stop. So the controller brakes all axes, levels the tilts, lowers y to the lower stop and ends the
+current there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maglev_controller.parameters import ControllerParameters
+from maglev_controller.profile import quintic_to_zero
+from maglev_plant.machine import AXES
+
+FloatArray = NDArray[np.float64]
+
+LEAST_BRAKING = 0.05
+"""Shortest time an axis brakes in [s], however near a stop is."""
+
+
+class Landing:
+    """A smooth way from any reference to rest on the lower stop; arrays in output order, (5,).
+
+    Braking takes x and z to rest where they would come to by themselves, the tilts to 0, and y to
+    rest; then y descends to the lower stop by a minimum-jerk profile, and is held there until
+    ``done``. The way stays within the stops.
+    """
+
+    def __init__(
+        self,
+        parameters: ControllerParameters,
+        position: FloatArray,
+        velocity: FloatArray,
+        acceleration: FloatArray,
+    ) -> None:
+        """Begin at a reference: position [m, rad], velocity, acceleration, (5,) each."""
+        machine = parameters.machine
+        self._period = parameters.sample_time
+        self._braking = parameters.landing.braking_time
+        self._descent = parameters.landing.descent_time
+        self._settle = parameters.landing.settle_time
+        self._floor = machine.gap_max
+        lower, upper = np.array(machine.lower_limit), np.array(machine.upper_limit)
+        self._start = np.clip(np.asarray(position, dtype=np.float64), lower, upper)
+        self._velocity = np.array(velocity, dtype=np.float64)
+        self._acceleration = np.array(acceleration, dtype=np.float64)
+        self._brakes = self._braking_times(lower, upper)
+        self._level = self._resting_place(lower, upper)
+        self._elapsed = 0.0
+        self.done = False
+
+    def _braking_times(self, lower: FloatArray, upper: FloatArray) -> FloatArray:
+        """How long each axis brakes (5,) [s]: less where a stop is near."""
+        room = np.where(self._velocity > 0.0, upper - self._start, self._start - lower)
+        speed = np.maximum(np.abs(self._velocity), 1e-9)
+        times: FloatArray = np.clip(1.5 * room / speed, LEAST_BRAKING, self._braking)
+        return times
+
+    def _resting_place(self, lower: FloatArray, upper: FloatArray) -> FloatArray:
+        """Where braking ends: halfway what the velocity would cover, off the stops, tilts level."""
+        margin = 0.02 * (upper - lower)
+        coasted = self._start + 0.5 * self._brakes * self._velocity
+        least, most = lower + margin, upper - margin
+        most[0] = upper[0]
+        level: FloatArray = np.clip(coasted, least, most)
+        level[3:] = 0.0
+        return level
+
+    def step(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Position, velocity, acceleration (5,) of the next sample; the last sets ``done``."""
+        self._elapsed += self._period
+        position, velocity, acceleration = self._level.copy(), np.zeros(5), np.zeros(5)
+        if self._elapsed < self._braking:
+            for axis in range(5):
+                offset, rate, bend = quintic_to_zero(
+                    self._start[axis] - self._level[axis],
+                    self._velocity[axis],
+                    self._acceleration[axis],
+                    self._brakes[axis],
+                    self._elapsed,
+                )
+                position[axis] += offset
+                velocity[axis], acceleration[axis] = rate, bend
+            return position, velocity, acceleration
+        offset, velocity[0], acceleration[0] = quintic_to_zero(
+            self._level[0] - self._floor, 0.0, 0.0, self._descent, self._elapsed - self._braking
+        )
+        position[0] = self._floor + offset
+        self.done = self._elapsed >= self._braking + self._descent + self._settle
+        return position, velocity, acceleration
+
+
+def reference_fault(parameters: ControllerParameters, position: FloatArray) -> str:
+    """Why a reference position (5,) [m, rad] cannot be followed, or an empty string.
+
+    Beyond the stops by more than the measurement's margin is out of reach.
+    """
+    machine, margin = parameters.machine, parameters.measurement.margin
+    bounds = zip(AXES, position, machine.lower_limit, machine.upper_limit, strict=True)
+    for axis, value, lower, upper in bounds:
+        slack = margin if axis in ('y', 'x', 'z') else margin / machine.radius
+        if not lower - slack <= value <= upper + slack:
+            return f'reference {axis} is {value:.6g}, the stops leave [{lower:.6g}, {upper:.6g}]'
+    return ''

@@ -1,0 +1,266 @@
+"""One sample of the control law on flat arrays, compiled: (14), (16), (17) and an inverse.
+
+:class:`~maglev_controller.regulator.Regulator` fills the arrays and explains the law.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maglev_controller.inverse import Limits, exact_inverse, simplified_inverse
+from maglev_controller.profile import quintic_to_zero, transition_time
+from maglev_plant.compiled import compiled
+from maglev_plant.machine import machine_from_array
+from maglev_plant.platen import outputs_from_gaps
+
+FloatArray = NDArray[np.float64]
+
+JUMP: Final = 2e-4
+"""A change of the reference within one sample that its velocity does not explain [m, rad] and that
+counts as a jump; a reference without velocities can still move at 0.2 m/s."""
+
+LARGEST_REFERENCE: Final = 1e6
+"""Sum of all the reference's magnitudes beyond which it is refused, like one that is not finite."""
+
+# Rows of an axis' law: total gain on (e, ė, ξ), N_d, E_d, then Φ_d.
+GAIN: Final = 0
+DRIVE: Final = 1
+ANTIWINDUP: Final = 2
+TRANSITION: Final = 3
+
+# Elements of the settings.
+FILTER_GAIN: Final = 0  # [1/s]
+FILTER_FORGET: Final = 1
+FEED_FORWARD: Final = 2
+EXACT: Final = 3
+PAPER_ANTIWINDUP: Final = 4
+CURRENT: Final = 5  # [A]
+LEVITATION_FIRST: Final = 6
+LEAST_ATTRACTION: Final = 7
+WARP: Final = 8  # [m]
+PERIOD: Final = 9  # [s]
+JUMP_TIME: Final = 10  # [s]
+CONTROLLED: Final = 11  # five
+RANGE: Final = 16  # lower and upper bound of each axis
+JUMP_ACCELERATION: Final = 26  # five
+SETTINGS: Final = 31
+
+# Columns of an axis' state.
+FRESH: Final = 0  # 1 before the first sample
+FILTER: Final = 1  # f of the derivative filter
+LAGGED: Final = 2  # velocity of the reference, through the same filter
+LAST_POSITION: Final = 3  # of the reference
+LAST_VELOCITY: Final = 4
+LAST_SPEED: Final = 5  # of the reference with jumps made good
+DURATION: Final = 6  # of the transition that makes a jump good
+ELAPSED: Final = 7
+OFFSET: Final = 8  # position, velocity, acceleration at its start
+MODEL: Final = 11  # ξ
+
+# Rows of the telemetry, and of the scratch space.
+POSITION: Final = 0
+ERROR: Final = 1
+ERROR_RATE: Final = 2
+VIRTUAL_INPUT: Final = 3
+INTERNAL_MODEL: Final = 4
+OUTPUT: Final = 0
+REALISED: Final = 1
+USED_ERROR: Final = 2
+EXCESS: Final = 3
+NEXT: Final = 4
+
+# What a step returns; above SATURATED it is a fault.
+OK: Final = 0
+SATURATED: Final = 1
+NOT_FINITE: Final = 2
+WARPED: Final = 3
+OUT_OF_RANGE: Final = 4
+BAD_REFERENCE: Final = 5
+
+
+class ControlArrays(NamedTuple):
+    """What :func:`control_step` works on; n is the order of the largest internal model."""
+
+    constants: FloatArray  # the machine, as machine_from_array takes it
+    law: FloatArray  # (5, 3 + n, 2 + n)
+    settings: FloatArray  # (SETTINGS,)
+    state: FloatArray  # (5, MODEL + n)
+    telemetry: FloatArray  # (5, 5)
+    scratch: FloatArray  # (5, max(5, n))
+
+
+@compiled
+def _check(settings: FloatArray, output: FloatArray, warp: float, reference_size: float) -> int:
+    """Whether the outputs can be used: a fault code, or 0."""
+    if not math.isfinite(output[0] + output[1] + output[2] + output[3] + output[4]):
+        return NOT_FINITE
+    if not abs(warp) <= settings[WARP]:
+        return WARPED
+    for axis in range(5):
+        low, high = settings[RANGE + 2 * axis], settings[RANGE + 2 * axis + 1]
+        if not low <= output[axis] <= high:
+            return OUT_OF_RANGE
+    if not reference_size < LARGEST_REFERENCE:
+        return BAD_REFERENCE
+    return OK
+
+
+@compiled
+def _follow_jump(
+    settings: FloatArray, axis: int, own: FloatArray, jump: float
+) -> tuple[float, float, float]:
+    """What to add to the reference (position, velocity, acceleration) so that it has no jump.
+
+    A jump starts a transition that makes it good in ``JUMP_TIME`` or, where it is too far for that,
+    within the axis' acceleration; one that comes during another starts from where that one is.
+    """
+    own[ELAPSED] += settings[PERIOD]
+    offset, rate, bend = quintic_to_zero(
+        own[OFFSET], own[OFFSET + 1], own[OFFSET + 2], own[DURATION], own[ELAPSED]
+    )
+    if settings[JUMP_TIME] > 0.0 and abs(jump) > JUMP:
+        offset -= jump
+        own[OFFSET], own[OFFSET + 1], own[OFFSET + 2] = offset, rate, bend
+        own[ELAPSED] = 0.0
+        own[DURATION] = transition_time(
+            offset, settings[JUMP_ACCELERATION + axis], settings[JUMP_TIME]
+        )
+    return offset, rate, bend
+
+
+@compiled
+def _virtual_inputs(
+    law: FloatArray,
+    settings: FloatArray,
+    state: FloatArray,
+    telemetry: FloatArray,
+    position: FloatArray,
+    velocity: FloatArray,
+    acceleration: FloatArray,
+    used_error: FloatArray,
+) -> None:
+    """w of (16) on every axis; fills the telemetry and moves the derivative filters on."""
+    gain, forget = settings[FILTER_GAIN], settings[FILTER_FORGET]
+    states = state.shape[1] - MODEL
+    for axis in range(5):
+        own = state[axis]
+        measured = telemetry[POSITION, axis]
+        fresh = own[FRESH] != 0.0
+        if fresh:
+            own[FRESH], own[FILTER] = 0.0, measured
+            jump = position[axis] - measured
+        else:
+            mean = 0.5 * (velocity[axis] + own[LAST_VELOCITY])
+            jump = position[axis] - own[LAST_POSITION] - settings[PERIOD] * mean
+        offset, rate, bend = _follow_jump(settings, axis, own, jump)
+        speed = velocity[axis] + rate
+        if not fresh:
+            own[LAGGED] += forget * (0.5 * (speed + own[LAST_SPEED]) - own[LAGGED])
+        own[LAST_POSITION], own[LAST_VELOCITY], own[LAST_SPEED] = (
+            position[axis],
+            velocity[axis],
+            speed,
+        )
+        change = measured - own[FILTER]
+        own[FILTER] += forget * change
+        used_error[axis] = measured - position[axis] - offset
+        error_rate = gain * change - own[LAGGED]
+        share = 0.0
+        for index in range(states):
+            share += law[axis, GAIN, 2 + index] * own[MODEL + index]
+        w = law[axis, GAIN, 0] * used_error[axis] + law[axis, GAIN, 1] * error_rate + share
+        telemetry[ERROR, axis] = measured - position[axis]
+        telemetry[ERROR_RATE, axis] = error_rate
+        telemetry[INTERNAL_MODEL, axis] = share
+        telemetry[VIRTUAL_INPUT, axis] = w + bend + settings[FEED_FORWARD] * acceleration[axis]
+
+
+@compiled
+def _advance_models(
+    law: FloatArray,
+    settings: FloatArray,
+    state: FloatArray,
+    telemetry: FloatArray,
+    realised: FloatArray,
+    excess: FloatArray,
+    used_error: FloatArray,
+    new: FloatArray,
+) -> None:
+    """ξ⁺ = Φ_d ξ + N_d e + E_d (what was realised less what was wanted), (14), (17)."""
+    states = state.shape[1] - MODEL
+    paper = settings[PAPER_ANTIWINDUP] != 0.0
+    for axis in range(5):
+        if settings[CONTROLLED + axis] == 0.0:
+            continue
+        error = used_error[axis]
+        if paper:
+            lost = excess[axis - 1] if axis == 1 or axis == 2 else 0.0
+        else:
+            lost = realised[axis] - telemetry[VIRTUAL_INPUT, axis]
+        for row in range(states):
+            value = law[axis, DRIVE, row] * error + law[axis, ANTIWINDUP, row] * lost
+            for column in range(states):
+                value += law[axis, TRANSITION + row, column] * state[axis, MODEL + column]
+            new[row] = value
+        for row in range(states):
+            state[axis, MODEL + row] = new[row]
+
+
+@compiled
+def control_step(
+    constants: FloatArray,
+    law: FloatArray,
+    settings: FloatArray,
+    state: FloatArray,
+    telemetry: FloatArray,
+    scratch: FloatArray,
+    gap: FloatArray,
+    x: float,
+    z: float,
+    position: FloatArray,
+    velocity: FloatArray,
+    acceleration: FloatArray,
+    direct: FloatArray,
+    quadrature: FloatArray,
+) -> int:
+    """One sample; see ``Regulator.step``. Returns a code; on a fault only the currents change."""
+    machine = machine_from_array(constants)
+    output, realised, used_error = (
+        scratch[OUTPUT, :5],
+        scratch[REALISED, :5],
+        scratch[USED_ERROR, :5],
+    )
+    excess, new = scratch[EXCESS, :2], scratch[NEXT]
+    warp = outputs_from_gaps(machine, gap, x, z, output)
+    size = 0.0
+    for axis in range(5):
+        size += abs(position[axis]) + abs(velocity[axis]) + abs(acceleration[axis])
+    code = _check(settings, output, warp, size)
+    if code != OK:
+        for motor in range(4):
+            direct[motor] = 0.0
+            quadrature[motor] = 0.0
+        return code
+    for axis in range(5):
+        telemetry[POSITION, axis] = output[axis]
+    _virtual_inputs(law, settings, state, telemetry, position, velocity, acceleration, used_error)
+    limits = Limits(settings[CURRENT], settings[LEVITATION_FIRST], settings[LEAST_ATTRACTION])
+    controlled = settings[CONTROLLED : CONTROLLED + 5]
+    wanted = telemetry[VIRTUAL_INPUT]
+    if settings[EXACT] != 0.0:
+        saturated = exact_inverse(
+            machine, limits, controlled, output, wanted, direct, quadrature, realised, excess
+        )
+    else:
+        saturated = simplified_inverse(
+            machine, limits, controlled, output, wanted, direct, quadrature, realised, excess
+        )
+    if not saturated:
+        for axis in range(5):
+            realised[axis] = wanted[axis]
+    _advance_models(law, settings, state, telemetry, realised, excess, used_error, new)
+    return SATURATED if saturated else OK

@@ -1,0 +1,250 @@
+"""The controller's node: answers every measurement with currents."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from std_srvs.srv import SetBool, Trigger
+
+from maglev_controller.parameters import ControllerParameters
+from maglev_controller.supervision import Mode, Phase, Supervisor
+from maglev_msgs.msg import ControllerState, Currents, Measurement, Reference
+from maglev_node.node import MaglevNode, SourceParameters
+from maglev_node.node import main as run_main
+from maglev_node.parameters import ParameterError, parameter
+from maglev_node.stamp import copy_stamp, stamp_now
+from maglev_node.topics import CONTROLLER_STATE, CURRENTS, MEASUREMENT, REFERENCE, sample_qos
+
+_SILENCE = 0.5  # without a sample for this long the stage is taken for stopped [s]
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class ControllerNodeParameters(SourceParameters, ControllerParameters):
+    """The regulator and how its node runs it."""
+
+    mode: str = parameter(
+        'lockstep',
+        choices=('lockstep', 'realtime'),
+        description='lockstep: wait for the reference of each sample; realtime: never wait',
+        read_only=True,
+    )
+    enabled: bool = parameter(
+        True, description='follow the reference from the start; false: after ~/enable'
+    )
+    realtime_priority: int = parameter(
+        40,
+        lower=0,
+        upper=98,
+        description='realtime: SCHED_FIFO priority of the process, where permitted; 0: none',
+        read_only=True,
+    )
+    reference_timeout: float = parameter(
+        2.0,
+        unit='s',
+        lower=0.1,
+        upper=600.0,
+        description='lockstep: longest wait for a reference in flight, wall clock; then it lands',
+    )
+    measurement_timeout: float = parameter(
+        0.02,
+        unit='s',
+        lower=0.001,
+        upper=1.0,
+        description='a longer gap between measurements, in stage time, is a fault in flight',
+    )
+
+
+class ControllerNode(MaglevNode[ControllerNodeParameters]):
+    """Currents for each measurement, the controller's state for analysis, and its services.
+
+    In lockstep the answer waits for the reference of its sample, without limit for the very first,
+    so that a run begins when everything is there and is the same every time.
+    """
+
+    def __init__(self) -> None:
+        super().__init__('controller', ControllerNodeParameters)
+        self.supervisor = Supervisor(self.parameters, enabled=self.parameters.enabled)
+        self._lockstep = self.parameters.mode == 'lockstep'
+        self._longest_gap = self.parameters.measurement_timeout / self.parameters.sample_time
+        self._sequence = -1
+        self._pending: Measurement | None = None
+        self._pending_since = self._answered = 0.0
+        self._reference_lost = self._reference_over = False
+        self._logged = (self.supervisor.mode, self.supervisor.reason)
+        self._currents, self._state = Currents(), ControllerState()
+        self._currents.header.frame_id = self._state.header.frame_id = 'stage'
+        self.claim(CURRENTS, 'controller')
+        self._currents_publisher = self.create_publisher(Currents, CURRENTS, sample_qos())
+        self._state_publisher = self.create_publisher(
+            ControllerState, CONTROLLER_STATE, sample_qos()
+        )
+        self.create_subscription(Reference, REFERENCE, self._on_reference, sample_qos())
+        self.create_subscription(Measurement, MEASUREMENT, self._on_measurement, sample_qos())
+        self.create_service(SetBool, '~/enable', self._on_enable)
+        self.create_service(Trigger, '~/emergency_stop', self._on_emergency_stop)
+        self.create_service(Trigger, '~/reset', self._on_reset)
+        self.create_timer(0.05, self._watch, clock=self.steady_clock)
+        if not self._lockstep:
+            self.take_realtime_priority(self.parameters.realtime_priority)
+        # The first line a process logs takes 20 ms, so it must not be one that is logged in flight.
+        self.get_logger().info(f'{self.parameters.mode}, waiting for {MEASUREMENT}')
+
+    def _on_reference(self, message: Reference) -> None:
+        self.supervisor.references.store(
+            message.sequence,
+            message.phase,
+            message.segment,
+            message.position,
+            message.velocity,
+            message.acceleration,
+        )
+        self._reference_lost = False
+        self._reference_over = message.phase == Phase.END
+        if self._pending is not None and message.sequence == self._pending.sequence:
+            self._answer(self._pending)
+
+    def _on_measurement(self, message: Measurement) -> None:
+        sequence = message.sequence
+        if self._sequence < 0 and not self._watched():
+            return
+        if sequence == self._sequence:  # repeated: the answer was not heard
+            self._currents_publisher.publish(self._currents)
+            return
+        if sequence < self._sequence:
+            self.get_logger().warning('the stage began anew')
+            self.supervisor.restart()
+        elif sequence - self._sequence > self._longest_gap and self.supervisor.flying:
+            self.supervisor.cut(f'{sequence - self._sequence - 1} measurements are missing')
+        if self._lockstep and self._awaits_reference(sequence):
+            if self._pending is None or self._pending.sequence != sequence:
+                self._pending, self._pending_since = message, time.monotonic()
+            return
+        self._answer(message)
+
+    def _watched(self) -> bool:
+        """Whether the stage, and all who shall see every sample, are there."""
+        watchers = self.parameters.watchers
+        return bool(
+            self._currents_publisher.get_subscription_count() >= watchers + 1
+            and self._state_publisher.get_subscription_count() >= watchers
+        )
+
+    def _awaits_reference(self, sequence: int) -> bool:
+        supervisor = self.supervisor
+        if self._reference_lost or supervisor.mode not in (Mode.WAITING, Mode.REGULATING):
+            return False
+        references = supervisor.references
+        if self._reference_over and sequence > references.newest:
+            return False
+        return references.find(sequence) < 0
+
+    def _answer(self, message: Measurement) -> None:
+        self._pending = None
+        self._answered = time.monotonic()
+        supervisor = self.supervisor
+        sequence = self._sequence = message.sequence
+        row = supervisor.references.find(sequence)
+        if row < 0 and self._reference_over and supervisor.references.newest < sequence:
+            row = supervisor.references.find(supervisor.references.newest)
+        supervisor.step(row, message.gap, message.x, message.z)
+        self._publish_currents(sequence)
+        self._publish_state(sequence)
+        if (supervisor.mode, supervisor.reason) != self._logged:
+            self._log_change()
+
+    def _publish_currents(self, sequence: int) -> None:
+        message = self._currents
+        stamp_now(message.header.stamp)
+        message.sequence = sequence
+        message.direct_current = self.supervisor.direct_current
+        message.quadrature_current = self.supervisor.quadrature_current
+        self._currents_publisher.publish(message)
+
+    def _publish_state(self, sequence: int) -> None:
+        message, regulator = self._state, self.supervisor.regulator
+        copy_stamp(self._currents.header.stamp, message.header.stamp)
+        message.sequence = sequence
+        message.mode = int(self.supervisor.mode)
+        message.saturated = self.supervisor.saturated
+        message.position = regulator.position
+        message.error = regulator.error
+        message.error_rate = regulator.error_rate
+        message.virtual_input = regulator.virtual_input
+        message.internal_model = regulator.internal_model
+        self._state_publisher.publish(message)
+
+    def _log_change(self) -> None:
+        mode, reason = self._logged = (self.supervisor.mode, self.supervisor.reason)
+        text = f'{mode.name.lower()} at sample {self._sequence}' + (f': {reason}' if reason else '')
+        if mode in (Mode.FAULT, Mode.LANDING):
+            self.get_logger().error(text)
+        else:
+            self.get_logger().info(text)
+
+    def _watch(self) -> None:
+        """In lockstep, give a lost reference up: the answer that waits for it starts a landing."""
+        if self._pending is None or self.supervisor.references.newest < 0:
+            return
+        if time.monotonic() - self._pending_since > self.parameters.reference_timeout:
+            self._reference_lost = True
+            self._answer(self._pending)
+
+    def may_stop(self) -> bool:
+        """Land before ending, unless the stage is silent."""
+        supervisor = self.supervisor
+        if supervisor.flying and supervisor.mode != Mode.LANDING:
+            supervisor.disable()
+        silent = time.monotonic() - self._answered > _SILENCE
+        return not supervisor.flying or silent
+
+    def _on_enable(self, request: Any, response: Any) -> Any:
+        action = self.supervisor.enable if request.data else self.supervisor.disable
+        response.success, response.message = action()
+        self._answer_pending()
+        return response
+
+    def _on_emergency_stop(self, _request: Any, response: Any) -> Any:
+        self.supervisor.cut('emergency stop')
+        self._publish_currents(self._sequence)
+        self._answer_pending()
+        response.success, response.message = True, 'currents cut; call ~/reset, then ~/enable'
+        return response
+
+    def _on_reset(self, _request: Any, response: Any) -> Any:
+        response.success, response.message = self.supervisor.reset_fault()
+        return response
+
+    def _answer_pending(self) -> None:
+        if self._pending is not None and not self._awaits_reference(self._pending.sequence):
+            self._answer(self._pending)
+
+    def on_parameters(self, parameters: ControllerNodeParameters) -> None:
+        """Gains, models and limits change between flights."""
+        if self.supervisor.flying:
+            raise ParameterError('the controller takes parameters on the ground only; land first')
+        self.supervisor.retune(parameters)
+        self._longest_gap = parameters.measurement_timeout / parameters.sample_time
+
+    def diagnose(self) -> tuple[bytes, str, Mapping[str, object]]:
+        """ERROR in a fault and in a landing nobody asked for."""
+        supervisor = self.supervisor
+        facts = {'mode': supervisor.mode.name, 'sequence': self._sequence}
+        failed = supervisor.mode in (Mode.FAULT, Mode.LANDING) or 'landed' in supervisor.reason
+        if failed and 'disabled' not in supervisor.reason:
+            return DiagnosticStatus.ERROR, f'{supervisor.mode.name}: {supervisor.reason}', facts
+        return DiagnosticStatus.OK, supervisor.reason or supervisor.mode.name.lower(), facts
+
+    def close(self) -> None:
+        """The last word is zero current."""
+        self.supervisor.cut('shut down')
+        if self._sequence >= 0:
+            self._publish_currents(self._sequence)
+
+
+def main() -> None:
+    """Entry point of the executable ``controller``."""
+    run_main(ControllerNode, 'controller')

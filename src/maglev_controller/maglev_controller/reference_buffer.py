@@ -1,0 +1,53 @@
+"""The references that have arrived ahead of time, found by sample number."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+class ReferenceBuffer:
+    """Holds the newest ``capacity`` references in a ring; a sample number is its own place.
+
+    ``position``, ``velocity``, ``acceleration`` have shape (capacity, 5), ``phase`` and ``segment``
+    (capacity,); the row of a sample is what :meth:`find` returns.
+    """
+
+    def __init__(self, capacity: int = 1024) -> None:
+        self.capacity = capacity
+        self.sequence: NDArray[np.int64] = np.full(capacity, -1, dtype=np.int64)
+        self.phase: NDArray[np.uint8] = np.zeros(capacity, dtype=np.uint8)
+        self.segment: NDArray[np.int64] = np.zeros(capacity, dtype=np.int64)
+        self.position: NDArray[np.float64] = np.zeros((capacity, 5))
+        self.velocity: NDArray[np.float64] = np.zeros((capacity, 5))
+        self.acceleration: NDArray[np.float64] = np.zeros((capacity, 5))
+        self.newest = -1
+
+    def clear(self) -> None:
+        """Forget everything."""
+        self.sequence[:] = -1
+        self.newest = -1
+
+    def store(
+        self,
+        sequence: int,
+        phase: int,
+        segment: int,
+        position: ArrayLike,
+        velocity: ArrayLike,
+        acceleration: ArrayLike,
+    ) -> None:
+        """Keep the reference of one sample; arrays (5,) in output order."""
+        row = sequence % self.capacity
+        self.sequence[row] = sequence
+        self.phase[row] = phase
+        self.segment[row] = segment
+        self.position[row] = position
+        self.velocity[row] = velocity
+        self.acceleration[row] = acceleration
+        self.newest = max(self.newest, sequence)
+
+    def find(self, sequence: int) -> int:
+        """The row of a sample's reference, -1 when it has not arrived or is forgotten."""
+        row = sequence % self.capacity
+        return row if self.sequence[row] == sequence else -1

@@ -1,0 +1,212 @@
+"""When the regulator acts: enabling, faults, and the landing the controller makes by itself."""
+
+from __future__ import annotations
+
+import enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maglev_controller.landing import Landing
+from maglev_controller.parameters import ControllerParameters
+from maglev_controller.reference_buffer import ReferenceBuffer
+from maglev_controller.regulator import MeasurementFault, Regulator
+
+FloatArray = NDArray[np.float64]
+
+
+class Mode(enum.IntEnum):
+    """What the controller is doing; the values of ``ControllerState.mode``."""
+
+    DISABLED = 0  # no current
+    WAITING = 1  # enabled, no current wanted
+    REGULATING = 2
+    LANDING = 3  # by itself
+    FAULT = 4  # latched, no current
+
+
+class Phase(enum.IntEnum):
+    """The phases of ``Reference`` that matter here."""
+
+    REST = 0
+    STEP = 4
+    END = 6
+
+
+_FLYING_MARGIN = 5e-4  # above the lower stop, beyond encoder and stop compliance [m]
+
+
+class Supervisor:
+    """Runs the regulator when it should run, and sees to it that no current flows otherwise.
+
+    Without current the platen is slammed into the upper stop from anywhere above the equilibrium,
+    so while the measurement can be believed every way out of flight is a landing; only when it
+    cannot, the currents are cut at once. ``direct_current`` and ``quadrature_current`` (4,) [A]
+    hold the answer of the last :meth:`step`.
+    """
+
+    def __init__(self, parameters: ControllerParameters, *, enabled: bool = True) -> None:
+        """Raises ParameterError when the regulator cannot be designed."""
+        self.parameters = parameters
+        self.regulator = Regulator(parameters)
+        self.references = ReferenceBuffer()
+        self.mode = Mode.WAITING if enabled else Mode.DISABLED
+        self.reason = '' if enabled else 'not enabled'
+        self.saturated = False
+        self.direct_current: FloatArray = np.zeros(4)
+        self.quadrature_current: FloatArray = np.zeros(4)
+        self._landing: Landing | None = None
+        self._row = -1  # of the reference last followed
+        self._segment = -1
+        self._lower_stop = parameters.machine.gap_max
+
+        self._warm_up()
+
+    def _warm_up(self) -> None:
+        """Compile, or load what was compiled, before the first sample asks for it."""
+        rest = np.array([self._lower_stop, 0.0, 0.0, 0.0, 0.0])
+        self._regulate(np.full(4, self._lower_stop), 0.0, 0.0, rest, np.zeros(5), np.zeros(5))
+        Landing(self.parameters, rest, np.zeros(5), np.zeros(5)).step()
+        self.regulator.reset()
+        self._no_current()
+
+    @property
+    def flying(self) -> bool:
+        """Whether currents flow."""
+        return self.mode in (Mode.REGULATING, Mode.LANDING)
+
+    def retune(self, parameters: ControllerParameters) -> None:
+        """Take new parameters, on the ground only. Raises ParameterError when they are no good."""
+        self.regulator = Regulator(parameters)
+        self.parameters = parameters
+        self._lower_stop = parameters.machine.gap_max
+
+    def enable(self) -> tuple[bool, str]:
+        """Follow the reference from its next lift-off on; refused while a fault is latched."""
+        if self.mode == Mode.FAULT:
+            return False, f'{self.reason}; reset first'
+        if self.mode == Mode.DISABLED:
+            self.mode, self.reason = Mode.WAITING, ''
+        return True, 'enabled'
+
+    def disable(self) -> tuple[bool, str]:
+        """End with no current: after a landing when the platen flies."""
+        if self.flying:
+            self._land('disabled')
+            return True, 'landing first, then the currents end'
+        if self.mode != Mode.FAULT:
+            self.mode, self.reason = Mode.DISABLED, 'disabled'
+        return True, 'disabled'
+
+    def cut(self, reason: str) -> None:
+        """No current from now on, until :meth:`reset_fault`."""
+        self.mode, self.reason = Mode.FAULT, reason
+        self._no_current()
+
+    def reset_fault(self) -> tuple[bool, str]:
+        """Clear a latched fault; the controller is then disabled."""
+        if self.mode != Mode.FAULT:
+            return False, 'there is no fault'
+        cleared, self.mode, self.reason = self.reason, Mode.DISABLED, 'reset, not enabled'
+        return True, f'cleared: {cleared}'
+
+    def restart(self) -> None:
+        """The stage began anew: what was known of it and of the reference is void."""
+        self.references.clear()
+        if self.flying:
+            self.mode, self.reason = Mode.WAITING, ''
+        self._no_current()
+
+    def step(self, row: int, gap: FloatArray, x: float, z: float) -> None:
+        """Answer one measurement: ``gap`` (4,), ``x``, ``z`` [m].
+
+        ``row`` is that of its reference in :attr:`references`, -1 when there is none, which in
+        flight means that the reference is lost.
+        """
+        if self.mode == Mode.WAITING and row >= 0 and self._wants_current(row):
+            self.regulator.reset()
+            self.mode = Mode.REGULATING
+        elif self.mode == Mode.REGULATING and row < 0:
+            self._land('the reference stopped')
+        elif self.mode == Mode.REGULATING and not self._wants_current(row):
+            self._end(float(np.mean(gap)))
+        if self.mode == Mode.REGULATING:
+            self._follow(row, gap, x, z)
+        elif self.mode == Mode.LANDING:
+            self._descend(gap, x, z)
+        else:
+            self._no_current()
+
+    def _wants_current(self, row: int) -> bool:
+        return self.references.phase[row] not in (Phase.REST, Phase.END)
+
+    def _end(self, gap: float) -> None:
+        """The reference wants no current any more."""
+        if gap < self._lower_stop - _FLYING_MARGIN:
+            self._land('the reference ended in flight')
+        else:
+            self.mode = Mode.WAITING
+
+    def _follow(self, row: int, gap: FloatArray, x: float, z: float) -> None:
+        references = self.references
+        if references.segment[row] != self._segment:
+            self._segment = int(references.segment[row])
+            restart = self.parameters.internal_model.restart_at_step
+            if restart and references.phase[row] == Phase.STEP:
+                self.regulator.reset()
+        self._row = row
+        self._regulate(
+            gap,
+            x,
+            z,
+            references.position[row],
+            references.velocity[row],
+            references.acceleration[row],
+        )
+
+    def _land(self, reason: str) -> None:
+        references, row = self.references, self._row
+        self.mode, self.reason = Mode.LANDING, reason
+        self._landing = Landing(
+            self.parameters,
+            references.position[row],
+            references.velocity[row],
+            references.acceleration[row],
+        )
+
+    def _descend(self, gap: FloatArray, x: float, z: float) -> None:
+        assert self._landing is not None
+        position, velocity, acceleration = self._landing.step()
+        if self._landing.done:
+            self.mode, self.reason = Mode.DISABLED, f'landed: {self.reason}'
+            self._no_current()
+        else:
+            self._regulate(gap, x, z, position, velocity, acceleration)
+
+    def _regulate(
+        self,
+        gap: FloatArray,
+        x: float,
+        z: float,
+        position: FloatArray,
+        velocity: FloatArray,
+        acceleration: FloatArray,
+    ) -> None:
+        try:
+            self.saturated = self.regulator.step(
+                gap,
+                x,
+                z,
+                position,
+                velocity,
+                acceleration,
+                self.direct_current,
+                self.quadrature_current,
+            )
+        except MeasurementFault as fault:
+            self.cut(str(fault))
+
+    def _no_current(self) -> None:
+        self.direct_current[:] = 0.0
+        self.quadrature_current[:] = 0.0
+        self.saturated = False
