@@ -33,6 +33,8 @@ DISCOVERY_TIME = 1.0
 _PROBATION = 5.0
 """How long it goes on looking afterwards, and is the one to leave [s]."""
 
+_BACKGROUND_NICENESS = 5
+
 _SPIN_BOUND = 0.1
 """Longest wait inside the executor [s]; signals are seen at least this often."""
 
@@ -239,11 +241,14 @@ def run(make_node: Callable[[], MaglevNode[Any]], name: str) -> int:
     return 128 + caught[0] if caught else 0
 
 
-def main(make_node: Callable[[], MaglevNode[Any]], name: str) -> None:
+def main(make_node: Callable[[], MaglevNode[Any]], name: str, *, background: bool = False) -> None:
     """Entry point of an executable: run one node and leave with its exit code.
 
+    A node in the background yields to those of the loop when they want the same core.
     Leaves without the interpreter's own teardown, which may block in the middleware.
     """
+    if background:
+        os.nice(_BACKGROUND_NICENESS)
     try:
         code = run(make_node, name)
     except Exception:

@@ -1,0 +1,1 @@
+"""Metrics, recording, bag analysis and report of the maglev stage, and their nodes."""

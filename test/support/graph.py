@@ -1,0 +1,158 @@
+"""Real nodes in processes of their own, over real DDS."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from ament_index_python.packages import get_package_prefix
+from rclpy.experimental.events_executor import EventsExecutor
+from std_srvs.srv import SetBool, Trigger
+
+from maglev_node.polling import PolledSubscription, Queues
+from maglev_node.topics import SAMPLE_TOPICS
+
+ROOT = Path(__file__).resolve().parents[2]
+PARAMS = ROOT / 'params'
+
+
+def executable(package: str, name: str) -> str:
+    """Path of an installed executable, which is what ``ros2 run`` runs."""
+    return str(Path(get_package_prefix(package)) / 'lib' / package / name)
+
+
+class Process:
+    """One started node; its output is in ``log``."""
+
+    def __init__(self, command: list[str], log: Path) -> None:
+        self.log = log
+        with log.open('wb') as output:
+            self._process = subprocess.Popen(
+                command, stdout=output, stderr=subprocess.STDOUT, start_new_session=True
+            )
+        self.pid = self._process.pid
+
+    def wait(self, timeout: float = 30.0) -> int:
+        """Exit code, as a shell would give it."""
+        code = self._process.wait(timeout)
+        return code if code >= 0 else 128 - code
+
+    def signal(self, number: signal.Signals) -> None:
+        """Send a signal to the process, if it still runs."""
+        if self._process.poll() is None:
+            self._process.send_signal(number)
+
+    @property
+    def running(self) -> bool:
+        """Whether the process has not ended."""
+        return self._process.poll() is None
+
+    @property
+    def output(self) -> str:
+        """All it printed so far."""
+        return self.log.read_text(errors='replace')
+
+    def wait_for(self, text: str, timeout: float = 30.0) -> None:
+        """Wait until it has printed a text; fails when it ends or time runs out before."""
+        deadline = time.monotonic() + timeout
+        while text not in self.output:
+            assert self.running, f'ended before it said {text!r}:\n{self.output}'
+            assert time.monotonic() < deadline, f'never said {text!r}:\n{self.output}'
+            time.sleep(0.02)
+
+    def kill(self) -> None:
+        """End it at once, with everything it started."""
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.pid, signal.SIGKILL)
+        self._process.wait(10)
+
+
+class Nodes:
+    """Starts nodes by name; whatever still runs at the end of a test is killed."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.started: list[Process] = []
+
+    def start(self, name: str, *arguments: str, params: tuple[str | Path, ...] = ()) -> Process:
+        """Start ``plant``, ``controller``, … with parameters ``name:=value`` and files."""
+        package = {'recorder': 'maglev_monitor'}.get(name, f'maglev_{name}')
+        command = [executable(package, name), '--ros-args']
+        for file in params:
+            path = PARAMS / file if (PARAMS / file).exists() else Path(file)
+            command += ['--params-file', str(path)]
+        for argument in arguments:
+            command += ['-p', argument]
+        return self.run(name, command)
+
+    def run(self, name: str, command: list[str]) -> Process:
+        """Start any command."""
+        process = Process(command, self.folder / f'{name}-{len(self.started)}.log')
+        self.started.append(process)
+        return process
+
+
+class Observer:
+    """A node of the test's own that keeps every message of the sample topics it watches."""
+
+    def __init__(self) -> None:
+        self._context = rclpy.Context()
+        self._context.init()
+        self.node = rclpy.create_node('observer', context=self._context)
+        self._executor = EventsExecutor(context=self._context)
+        self._executor.add_node(self.node)
+        self._queues = Queues(self.node)
+        self._subscriptions: dict[str, PolledSubscription] = {}
+        self.messages: dict[str, list[Any]] = {}
+
+    def watch(self, *topics: str) -> None:
+        """Keep the messages of these topics from now on."""
+        for topic in topics:
+            self.messages[topic] = []
+            self._subscriptions[topic] = self._queues.subscribe(topic, SAMPLE_TOPICS[topic])
+
+    def look(self) -> dict[str, list[Any]]:
+        """All messages so far, by topic."""
+        for topic, subscription in self._subscriptions.items():
+            self.messages[topic].extend(message for message, _ in subscription.take())
+        return self.messages
+
+    def newest(self, topic: str) -> Any:
+        """The newest message of a topic, None before the first."""
+        messages = self.look()[topic]
+        return messages[-1] if messages else None
+
+    def wait(self, condition: Callable[[], bool], timeout: float = 30.0) -> None:
+        """Look until something holds."""
+        deadline = time.monotonic() + timeout
+        while not condition():
+            assert time.monotonic() < deadline, 'it never held'
+            self.look()
+            time.sleep(0.01)
+
+    def call(self, service: str, data: bool | None = None) -> Any:
+        """Call a Trigger service, or with ``data`` a SetBool service."""
+        service_type = Trigger if data is None else SetBool
+        client = self.node.create_client(service_type, service)
+        assert client.wait_for_service(timeout_sec=10.0), f'there is no {service}'
+        request = service_type.Request()
+        if data is not None:
+            request.data = data
+        future = client.call_async(request)
+        self._executor.spin_until_future_complete(future, timeout_sec=10.0)
+        assert future.done(), f'{service} never answered'
+        return future.result()
+
+    def close(self) -> None:
+        """Leave the graph."""
+        self._queues.destroy()
+        self._executor.shutdown()
+        self.node.destroy_node()
+        self._context.try_shutdown()

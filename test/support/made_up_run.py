@@ -1,0 +1,161 @@
+"""A made-up run: columns, serialized messages and a bag; encoded by rosbags, not by us."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from maglev_monitor.bag_writer import BagWriter
+from maglev_monitor.samples import Phase
+
+MESSAGES = Path(__file__).parents[2] / 'src' / 'maglev_msgs' / 'msg'
+RADIUS = 0.397
+TOPICS = {
+    'reference': ('/reference', 'maglev_msgs/msg/Reference'),
+    'measurement': ('/stage/measurement', 'maglev_msgs/msg/Measurement'),
+    'currents': ('/stage/currents', 'maglev_msgs/msg/Currents'),
+    'controller': ('/controller/state', 'maglev_msgs/msg/ControllerState'),
+    'plant': ('/stage/true_state', 'maglev_msgs/msg/PlantState'),
+}
+
+
+@dataclasses.dataclass
+class Run:
+    """Columns of a run by sample number, all of length n."""
+
+    phase: NDArray[np.uint8]
+    segment: NDArray[np.uint32]
+    reference: NDArray[np.float64]
+    target: NDArray[np.float64]
+    position: NDArray[np.float64]  # true outputs
+    gap: NDArray[np.float64]
+    direct: NDArray[np.float64]
+    quadrature: NDArray[np.float64]
+    saturated: NDArray[np.bool_]
+    late: NDArray[np.uint64]
+    stamp: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.phase)
+
+
+def make_run(n: int = 1200, seed: int = 1) -> Run:
+    """REST, LIFT_OFF, HOLD, a STEP of y, a STEP of theta, TRACK and END, with noise for errors."""
+    random = np.random.default_rng(seed)
+    parts = [
+        (Phase.REST, 0.05, [0.031, 0.0, 0.0, 0.0, 0.0]),
+        (Phase.LIFT_OFF, 0.1, [0.020, 0.0, 0.0, 0.0, 0.0]),
+        (Phase.HOLD, 0.1, [0.020, 0.0, 0.0, 0.0, 0.0]),
+        (Phase.STEP, 0.25, [0.027, 0.0, 0.0, 0.0, 0.0]),
+        (Phase.STEP, 0.2, [0.027, 0.0, 0.0, 0.0, 0.01]),
+        (Phase.TRACK, 0.2, [0.025, 0.0, 0.0, 0.0, 0.0]),
+        (Phase.LAND, 0.05, [0.031, 0.0, 0.0, 0.0, 0.0]),
+        (Phase.END, 0.05, [0.031, 0.0, 0.0, 0.0, 0.0]),
+    ]
+    bounds = np.round(np.cumsum([0.0, *(part[1] for part in parts)]) * n).astype(int)
+    phase, segment = np.zeros(n, np.uint8), np.zeros(n, np.uint32)
+    target = np.zeros((n, 5))
+    for number, (part, first, last) in enumerate(zip(parts, bounds[:-1], bounds[1:], strict=True)):
+        phase[first:last], segment[first:last], target[first:last] = part[0], number, part[2]
+    reference = target.copy()
+    tracking = phase == Phase.TRACK
+    angle = np.linspace(0.0, 4.0 * np.pi, np.count_nonzero(tracking))
+    reference[tracking, 0] += 0.005 * np.sin(angle)
+    reference[tracking, 1] = 0.03 * np.cos(angle)
+    reference[tracking, 2] = 0.03 * np.sin(angle)
+    age = np.concatenate([np.arange(b - a) for a, b in itertools.pairwise(bounds)])
+    before = np.vstack([target[:1], target[np.maximum(bounds[segment] - 1, 0)][1:]])
+    response = (np.exp(-age / 40.0) * np.cos(age / 15.0))[:, None] * (before - target)
+    position = reference + response + 2e-5 * random.standard_normal((n, 5))
+    sines = RADIUS * np.sin(position[:, 3:])
+    gap = position[:, :1] + np.stack([-sines[:, 0], sines[:, 1], sines[:, 0], -sines[:, 1]], axis=1)
+    tick = np.maximum(1_000_000 + 50_000 * random.standard_normal(n), 1e5).astype(np.int64)
+    return Run(
+        phase=phase,
+        segment=segment,
+        reference=reference,
+        target=target,
+        position=position,
+        gap=gap,
+        direct=random.uniform(-3.0, 3.0, (n, 4)),
+        quadrature=random.uniform(-3.0, 3.0, (n, 4)),
+        saturated=random.random(n) < 0.05,
+        late=np.cumsum(random.random(n) < 0.02).astype(np.uint64),
+        stamp=1_700_000_000_000_000_000 + np.cumsum(tick),
+    )
+
+
+class Encoder:
+    """Serializes a run's messages with rosbags."""
+
+    def __init__(self) -> None:
+        self.store = get_typestore(Stores.ROS2_JAZZY)
+        types: dict[str, Any] = {}
+        for file in MESSAGES.glob('*.msg'):
+            types.update(get_types_from_msg(file.read_text(), f'maglev_msgs/msg/{file.stem}'))
+        self.store.register(types)
+
+    def header(self, stamp: int, frame_id: str) -> Any:
+        seconds, nanoseconds = divmod(int(stamp), 1_000_000_000)
+        time = self.store.types['builtin_interfaces/msg/Time'](seconds, nanoseconds)
+        return self.store.types['std_msgs/msg/Header'](time, frame_id)
+
+    def message(self, run: Run, key: str, n: int, frame_id: str = '') -> bytes:
+        """The message of one topic for sample ``n``."""
+        name = TOPICS[key][1]
+        fields: dict[str, tuple[Any, ...]] = {
+            'reference': (
+                run.phase[n],
+                run.segment[n],
+                run.reference[n],
+                np.full(5, 1.0),
+                np.full(5, 2.0),
+                run.target[n],
+            ),
+            'measurement': (run.gap[n], run.position[n, 1], run.position[n, 2], run.late[n]),
+            'currents': (run.direct[n], run.quadrature[n]),
+            'controller': (2, bool(run.saturated[n]), *np.zeros((5, 5))),
+            'plant': (
+                np.stack([run.position[n], np.full(5, 0.1)], axis=1).ravel(),
+                run.direct[n],
+                run.quadrature[n],
+                np.full(4, 0.25),
+            ),
+        }
+        header = self.header(run.stamp[n], frame_id)
+        message = self.store.types[name](header, n, *fields[key])
+        return bytes(self.store.serialize_cdr(message, name))
+
+    def diagnostic(
+        self, stamp: int, level: int, name: str, text: str, values: dict[str, str]
+    ) -> bytes:
+        """A DiagnosticArray with one status."""
+        types = self.store.types
+        pairs = [types['diagnostic_msgs/msg/KeyValue'](key, value) for key, value in values.items()]
+        status = types['diagnostic_msgs/msg/DiagnosticStatus'](level, name, text, 'stage', pairs)
+        array = types['diagnostic_msgs/msg/DiagnosticArray'](self.header(stamp, ''), [status])
+        return bytes(self.store.serialize_cdr(array, 'diagnostic_msgs/msg/DiagnosticArray'))
+
+
+def open_bag(path: Path, **options: Any) -> BagWriter:
+    """A bag with the run's topics and diagnostics."""
+    writer = BagWriter(path, lambda _package: MESSAGES, **options)
+    writer.open()
+    for topic, message_type in TOPICS.values():
+        writer.add_topic(topic, message_type)
+    writer.add_topic('/diagnostics', 'diagnostic_msgs/msg/DiagnosticArray')
+    return writer
+
+
+def write_samples(writer: BagWriter, run: Run, messages: dict[str, list[bytes]]) -> None:
+    """All samples of a run in bursts, topic by topic, as a recorder that polls writes them."""
+    for first in range(0, len(run), 40):
+        for key, (topic, _) in TOPICS.items():
+            for n in range(first, min(first + 40, len(run))):
+                writer.write(topic, int(run.stamp[n]), messages[key][n])
