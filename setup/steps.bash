@@ -1,0 +1,220 @@
+# shellcheck shell=bash
+# The steps of the set-up, each quiet on success and explained in one line on failure.
+
+ticker=''
+
+# Show a step and its seconds while COMMAND works; its output goes to the log.
+step() { # TITLE COMMAND...
+  local title=$1 start=$SECONDS code=0
+  shift
+  printf '\n== %s: %s\n' "$title" "$*" >>"$log"
+  local before
+  before=$(wc -c <"$log")
+  if [[ -t 2 ]]; then
+    tick "$title" &
+    ticker=$!
+  else
+    say "$title"
+  fi
+  # A subshell with -e: a function that is a step must stop at its first failing command.
+  set +e
+  (set -e && "$@") >>"$log" 2>&1 </dev/null
+  code=$?
+  set -e
+  stop_ticker
+  if ((code)); then
+    explain "$title" "$(tail -c "+$before" -- "$log")"
+  fi
+  [[ ! -t 2 ]] || printf '\r\e[Ksetup: %s (%d s)\n' "$title" $((SECONDS - start)) >&2
+}
+
+tick() { # TITLE
+  exec 9>&-
+  local start=$SECONDS
+  trap - EXIT
+  while kill -0 $$ 2>/dev/null; do
+    printf '\r\e[Ksetup: %s ... %d s' "$1" $((SECONDS - start)) >&2
+    sleep 1
+  done
+}
+
+stop_ticker() {
+  if [[ -n $ticker ]]; then
+    kill "$ticker" 2>/dev/null || true
+    wait "$ticker" 2>/dev/null || true
+    ticker=''
+  fi
+}
+
+interrupted() { # SIGNAL CODE
+  trap - INT TERM HUP
+  stop_ticker
+  [[ ! -t 2 ]] || printf '\n' >&2
+  say 'interrupted: the next run completes it'
+  exit "$2"
+}
+
+# End the set-up with the most telling line of what the step said.
+explain() { # TITLE OUTPUT
+  [[ ! -t 2 ]] || printf '\r\e[K' >&2
+  local cause network='NewConnectionError|NameResolutionError|Temporary failure in name'
+  network+='|Network is unreachable|Connection refused|ConnectTimeout|ReadTimeout|ProxyError'
+  network+='|SSLError|Connection aborted|connection broken'
+  if grep -qE 'No space left on device|Errno 28' <<<"$2"; then
+    cause="no space left on the disk of $root or of ${TMPDIR:-/tmp}: make room"
+  elif grep -qF 'Disk quota exceeded' <<<"$2"; then
+    cause='the disk quota is used up: make room'
+  elif grep -qE "$network" <<<"$2"; then
+    cause='no network, pip cannot reach its package index: connect, or set https_proxy'
+  else
+    cause=$(grep -v '^CMake Error at' <<<"$2" |
+      grep -m 1 -E '(rror|Exception|Invalid[A-Za-z]*|ERROR)\b.*: ') ||
+      cause=$(tail -n 1 <<<"$2")
+    cause="${cause:0:200} (all of it: $log); mend that"
+  fi
+  [[ -f $venv/.stamp ]] || rm -rf -- "$venv"
+  fail "$1 failed: $cause; then run again"
+}
+
+# pip of the environment, untouched by the caller's own pip targets and python path.
+pip_install() {
+  env -u PYTHONPATH -u PYTHONHOME -u PIP_TARGET -u PIP_PREFIX -u PIP_USER \
+    -u PIP_REQUIRE_VIRTUALENV PIP_DISABLE_PIP_VERSION_CHECK=1 \
+    _ROS_WHEELS_BOOTSTRAP_COMPLETE=1 PYTHONNOUSERSITE=1 \
+    bash -c "${ros_setup:+. $ros_setup; } exec \"\$@\"" - \
+    "$venv/bin/python" -m pip install --no-input --progress-bar off --retries 2 "$@"
+}
+
+# The message modules of an installed ROS are compiled against the NumPy it came with: pin that one.
+keep_numpy() {
+  PYTHONNOUSERSITE=1 bash -c "${ros_setup:+. $ros_setup >/dev/null; } exec \"\$@\"" - \
+    "$python" -c 'import numpy; print("numpy==" + numpy.__version__)'
+}
+
+# The wheels' CMake files name the Python of the machine they were made on.
+fit_wheels() {
+  local include numpy_include made='/opt/python/cp[0-9]+-cp[0-9]+'
+  include=$("$venv/bin/python" -I -c 'import sysconfig; print(sysconfig.get_paths()["include"])')
+  numpy_include=$("$venv/bin/python" -I -c 'import numpy; print(numpy.get_include())')
+  grep -rlZ --include='*.cmake' /opt/python/cp3 "$venv/share" | xargs -0 sed -i -E \
+    -e "s#$made/lib/python[0-9.]+/site-packages/numpy/_core/include#$numpy_include#g" \
+    -e "s#$made/include/python[0-9.]+#$include#g"
+  ! grep -rl --include='*.cmake' /opt/python/cp3 "$venv/share"
+}
+
+# The shell code that gives the underlying ROS, for a process that starts from a bare environment.
+underlay() {
+  if [[ $branch == native ]]; then
+    printf '. %q\n' "$ros_setup"
+    return
+  fi
+  local libraries
+  libraries=$(printf ':%s' "$venv/lib" "$venv"/lib/python3*/site-packages/ros_*.libs)
+  printf 'export %s=%q\n' AMENT_PREFIX_PATH "$venv" CMAKE_PREFIX_PATH "$venv" \
+    LD_LIBRARY_PATH "${libraries#:}" _ROS_WHEELS_BOOTSTRAP_COMPLETE 1 \
+    RMW_IMPLEMENTATION rmw_fastrtps_cpp
+}
+
+# Run COMMAND in the underlay and nothing else of the caller's environment but what a build may
+# need.
+in_underlay() {
+  local name keep=()
+  for name in HOME USER TMPDIR TERM CC CXX CFLAGS CXXFLAGS LDFLAGS CMAKE_GENERATOR MAKEFLAGS; do
+    [[ -z ${!name:-} ]] || keep+=("$name=${!name}")
+  done
+  env -i "${keep[@]}" PATH="$venv/bin:$PATH" LC_ALL=C.UTF-8 PYTHONNOUSERSITE=1 \
+    bash -c "$(underlay)"$'\nexec "$@"' - "$@"
+}
+
+build_packages() {
+  cd "$root"
+  in_underlay "$venv/bin/python" \
+    -c 'from colcon_core.command import main; raise SystemExit(main())' \
+    --log-base .cache/colcon build --base-paths src --build-base build --install-base install \
+    --symlink-install --event-handlers console_direct- console_cohesion+ \
+    --cmake-args "-DPython3_EXECUTABLE=$venv/bin/python" -DBUILD_TESTING=OFF \
+    -DCMAKE_POLICY_VERSION_MINIMUM=3.5 --no-warn-unused-cli
+}
+
+# environment.bash: every path the underlay and the workspace add, moved to the front, and the
+# settings.
+write_and_check_environment() {
+  local file=$root/install/environment.bash name value ours=''
+  [[ $branch == wheels ]] || ours=:$(echo "$venv"/lib/python3*/site-packages)
+  {
+    cat <<'END'
+# shellcheck shell=bash
+# Written by setup/install.sh. Puts this workspace and its ROS into a bash.
+__maglev_first() { # NAME ENTRY...
+  local name=$1 entry rest=":${!1-}:" ours=''
+  shift
+  for entry; do
+    while [[ $rest == *":$entry:"* ]]; do
+      rest=${rest/":$entry:"/:}
+    done
+    ours+=$entry:
+  done
+  rest=${rest#:}
+  rest=$ours${rest%:}
+  export "$name=${rest%:}"
+}
+END
+    in_underlay bash -c ". '$root/install/local_setup.bash' && env -0" |
+      while IFS='=' read -rd '' name value; do
+        case $name in
+          PATH) first PATH "$venv/bin:$(paths_of_ros "$value")" ;;
+          PYTHONPATH) first "$name" "$value$ours" ;;
+          *_PREFIX_PATH | LD_LIBRARY_PATH | PKG_CONFIG_PATH) first "$name" "$value" ;;
+          ROS_DISTRO | ROS_VERSION | ROS_PYTHON_VERSION) setting "$name" "$value" ;;
+          _ROS_WHEELS_BOOTSTRAP_COMPLETE) setting "$name" "$value" ;;
+          RMW_IMPLEMENTATION) [[ $branch == native ]] || setting "$name" "$value" ;;
+        esac
+      done
+    setting PYTHONNOUSERSITE 1
+    setting NUMBA_CACHE_DIR "$cache/numba"
+    default ROS_AUTOMATIC_DISCOVERY_RANGE LOCALHOST
+    default OPENBLAS_NUM_THREADS 1
+    default OMP_NUM_THREADS 1
+    echo 'unset -f __maglev_first'
+  } >"$file.new"
+  mv -f -- "$file.new" "$file"
+  in_environment python -c 'import maglev_msgs.msg, matplotlib, numba, rclpy, rosbags, scipy
+rclpy.init()
+rclpy.shutdown()'
+}
+
+setting() { printf 'export %s=%q\n' "$1" "$2"; }
+
+default() { printf 'export %s="${%s:-%s}"\n' "$1" "$1" "$2"; }
+
+first() { # NAME VALUE
+  local entry entries
+  IFS=: read -ra entries <<<"$2"
+  printf '__maglev_first %s' "$1"
+  for entry in "${entries[@]}"; do
+    [[ -z $entry ]] || printf ' %q' "$entry"
+  done
+  printf '\n'
+}
+
+# What the ROS of the machine adds to PATH.
+paths_of_ros() {
+  local entry entries found=''
+  IFS=: read -ra entries <<<"$1"
+  for entry in "${entries[@]}"; do
+    [[ -z $ros_prefix || $entry != "$ros_prefix"* ]] || found+=$entry:
+  done
+  echo "${found%:}"
+}
+
+in_environment() {
+  env -i HOME="${HOME:-$root}" ROS_LOG_DIR="$cache/ros" PATH="$PATH" LC_ALL=C.UTF-8 \
+    bash -c ". '$root/install/environment.bash' && exec \"\$@\"" - "$@"
+}
+
+# Fill the cache of compiled functions, so that the first run starts as quickly as the second. Only
+# that depends on it, so a defect of the code is left for a run or the tests to show.
+warm_up() {
+  in_environment python -c 'import maglev_controller.closed_loop as loop; loop.warm_up()' ||
+    echo 'not compiled'
+}

@@ -1,0 +1,187 @@
+"""The loop of real nodes: it flies, it lands, and it ends well however it is disturbed."""
+
+from __future__ import annotations
+
+import signal
+
+import numpy as np
+import pytest
+from graph import Nodes, Observer, Process
+
+from maglev_msgs.msg import ControllerState
+from maglev_node.topics import CONTROLLER_STATE, CURRENTS, MEASUREMENT, REFERENCE, TRUE_STATE
+
+ELLIPSE = 'scenario_ellipse.yaml'
+LONG = 'duration:=600.0'
+WATCHED = 'watchers:=1'  # by the test
+LOWER_STOP = 0.031
+
+
+def fly(nodes: Nodes, *arguments: str, mode: str = 'lockstep') -> dict[str, Process]:
+    """Start plant, controller and reference on the ellipse."""
+    return {
+        'plant': nodes.start('plant', f'mode:={mode}', WATCHED, params=('benchmark.yaml',)),
+        'controller': nodes.start('controller', f'mode:={mode}', WATCHED),
+        'reference': nodes.start('reference', WATCHED, *arguments, params=(ELLIPSE,)),
+    }
+
+
+def gap(observer: Observer) -> float:
+    """The true air gap now [m]."""
+    newest = observer.newest(TRUE_STATE)
+    return LOWER_STOP if newest is None else float(newest.state[0])
+
+
+def airborne(observer: Observer) -> bool:
+    """Whether the platen is well off its stop."""
+    return gap(observer) < 0.026
+
+
+def impact_speed(observer: Observer) -> float:
+    """Greatest speed at which the platen came near one of its vertical stops [m/s]."""
+    states = np.array([message.state for message in observer.look()[TRUE_STATE]])
+    near = (states[:, 0] > LOWER_STOP - 1e-5) | (states[:, 0] < 0.018 + 1e-5)
+    return float(np.max(np.abs(states[near, 1]), initial=0.0))
+
+
+def landed_without_current(observer: Observer) -> bool:
+    """Whether the platen rests and nothing flows or is commanded."""
+    state, currents = observer.newest(TRUE_STATE), observer.newest(CURRENTS)
+    return bool(
+        abs(state.state[0] - LOWER_STOP) < 1e-5
+        and not np.any(currents.direct_current)
+        and not np.any(currents.quadrature_current)
+        and np.max(np.abs(state.direct_current)) < 1e-6
+    )
+
+
+@pytest.fixture
+def watching(observer: Observer) -> Observer:
+    """An observer of all sample topics, part of what the reference waits for."""
+    observer.watch(REFERENCE, MEASUREMENT, TRUE_STATE, CURRENTS, CONTROLLER_STATE)
+    return observer
+
+
+def test_lift_off_ellipse_landing(nodes: Nodes, watching: Observer) -> None:
+    graph = fly(nodes, 'duration:=2.0', 'exit_at_end:=true')
+    watching.wait(lambda: not graph['reference'].running, timeout=60)
+    assert graph['reference'].wait() == 0, graph['reference'].output
+    watching.wait(lambda: landed_without_current(watching))
+    assert impact_speed(watching) < 0.05
+    for topic, messages in watching.look().items():
+        numbers = [message.sequence for message in messages]
+        numbers = numbers[numbers.count(0) - 1 :]  # sample 0 is repeated until it is answered
+        assert numbers == list(range(len(numbers))), f'{topic} lost or repeated samples'
+    modes = [message.mode for message in watching.messages[CONTROLLER_STATE]]
+    assert ControllerState.FAULT not in modes
+    assert ControllerState.LANDING not in modes
+
+
+def test_without_its_reference_the_controller_lands(nodes: Nodes, watching: Observer) -> None:
+    graph = fly(nodes, LONG)
+    watching.wait(lambda: airborne(watching))
+    graph['reference'].kill()
+    watching.wait(lambda: landed_without_current(watching))
+    assert impact_speed(watching) < 0.05
+    assert 'the reference stopped' in graph['controller'].output
+    assert watching.newest(CONTROLLER_STATE).mode == ControllerState.DISABLED
+    answer = watching.call('/controller/enable', True)
+    assert answer.success
+
+
+def test_a_controller_told_to_end_lands_first(nodes: Nodes, watching: Observer) -> None:
+    graph = fly(nodes, LONG)
+    watching.wait(lambda: airborne(watching))
+    graph['controller'].signal(signal.SIGTERM)
+    watching.wait(lambda: not graph['controller'].running)
+    assert graph['controller'].wait() == 128 + signal.SIGTERM
+    assert watching.newest(CONTROLLER_STATE).mode == ControllerState.DISABLED
+    assert impact_speed(watching) < 0.05
+    assert gap(watching) == pytest.approx(LOWER_STOP, abs=1e-5)
+
+
+def test_disabled_it_lands_enabled_it_flies_again(nodes: Nodes, watching: Observer) -> None:
+    fly(nodes, LONG)
+    watching.wait(lambda: airborne(watching))
+    assert watching.call('/controller/enable', False).success
+    watching.wait(lambda: landed_without_current(watching))
+    assert impact_speed(watching) < 0.05
+
+
+def test_without_its_controller_the_plant_says_so(nodes: Nodes, watching: Observer) -> None:
+    graph = fly(nodes, LONG)
+    watching.wait(lambda: airborne(watching))
+    graph['controller'].kill()
+    assert graph['plant'].wait() == 1
+    assert 'no currents for sample' in graph['plant'].output
+    assert graph['reference'].wait() == 1
+    assert 'no measurement for' in graph['reference'].output
+
+
+def test_emergency_stop_is_latched(nodes: Nodes, watching: Observer) -> None:
+    graph = fly(nodes, LONG)
+    watching.wait(lambda: airborne(watching))
+    assert watching.call('/plant/emergency_stop').success
+    graph['plant'].wait_for('currents cut')
+    watching.wait(lambda: not np.any(watching.newest(TRUE_STATE).direct_current))
+    assert watching.call('/plant/reset').success
+    assert not watching.call('/plant/reset').success
+
+
+def test_emergency_stop_of_the_controller(nodes: Nodes, watching: Observer) -> None:
+    fly(nodes, LONG)
+    watching.wait(lambda: airborne(watching))
+    assert watching.call('/controller/emergency_stop').success
+    watching.wait(lambda: watching.newest(CONTROLLER_STATE).mode == ControllerState.FAULT)
+    assert not np.any(watching.newest(CURRENTS).direct_current)
+    assert not watching.call('/controller/enable', True).success
+    assert watching.call('/controller/reset').success
+    assert watching.call('/controller/enable', True).success
+
+
+def test_real_time(nodes: Nodes, watching: Observer) -> None:
+    graph = fly(nodes, 'duration:=2.0', 'exit_at_end:=true', 'lead:=200', mode='realtime')
+    watching.wait(lambda: not graph['reference'].running, timeout=60)
+    assert graph['reference'].wait() == 0, graph['reference'].output
+    assert graph['controller'].running
+    assert graph['plant'].running, graph['plant'].output
+    measurements = watching.look()[MEASUREMENT]
+    wall = measurements[-1].header.stamp.sec - measurements[0].header.stamp.sec
+    assert wall == pytest.approx(len(measurements) * 1e-3, abs=2.0)
+    assert 'currents cut' not in graph['plant'].output
+
+
+@pytest.mark.parametrize('name', ['plant', 'controller', 'reference'])
+def test_a_second_one_is_refused(nodes: Nodes, watching: Observer, name: str) -> None:
+    graph = fly(nodes, LONG)
+    watching.wait(lambda: airborne(watching))
+    second = nodes.start(name)
+    assert second.wait() == 1
+    assert 'there is another' in second.output
+    assert all(process.running for process in graph.values())
+
+
+@pytest.mark.parametrize(
+    ('name', 'argument', 'said'),
+    [
+        ('plant', 'amplifier.peak_curent:=7.0', "did you mean 'amplifier.peak_current'"),
+        ('plant', 'sample_time:=1.0', "'sample_time' is 1"),
+        ('controller', 'invers:=exact', "did you mean 'inverse'"),
+        ('controller', 'machine.mass_y:=6900.0', "'machine.mass_y' is 6900"),
+        ('controller', 'inverse:=exactly', "'inverse' is 'exactly'"),
+        ('reference', 'duration:=ten', "'duration' is 'ten'"),
+        ('monitor', 'timeout:=.nan', "'timeout' is nan"),
+        ('recorder', 'outptu:=/nowhere', "did you mean 'output'"),
+    ],
+)
+def test_a_wrong_parameter_is_refused(nodes: Nodes, name: str, argument: str, said: str) -> None:
+    node = nodes.start(name, argument)
+    assert node.wait() == 1
+    assert said in node.output
+    assert len(node.output.strip().splitlines()) == 1
+
+
+def test_a_missing_parameter_file_is_one_line(nodes: Nodes) -> None:
+    node = nodes.start('plant', params=('no_such_file.yaml',))
+    assert node.wait() == 1
+    assert 'no_such_file.yaml' in node.output

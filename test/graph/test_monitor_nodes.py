@@ -1,0 +1,186 @@
+"""Monitor and recorder as real nodes, fed with a made-up run over real DDS."""
+
+from __future__ import annotations
+
+import json
+import signal
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from graph import Nodes, Observer, Process
+from made_up_run import TOPICS, Encoder, Run, make_run
+from rosbags.rosbag2 import Reader
+
+from maglev_monitor.analysis import analyse
+from maglev_monitor.bag import Bag
+from maglev_node.stamp import stamp_now
+from maglev_node.topics import SAMPLE_TOPICS, sample_qos
+
+SAMPLES = 1500
+
+
+@pytest.fixture(scope='module')
+def run() -> Run:
+    return make_run(SAMPLES)
+
+
+@pytest.fixture(scope='module')
+def messages(run: Run) -> dict[str, list[bytes]]:
+    encoder = Encoder()
+    return {key: [encoder.message(run, key, n) for n in range(SAMPLES)] for key in TOPICS}
+
+
+class Feeder:
+    """Publishes the made-up run in the place of stage, controller and reference."""
+
+    def __init__(self, node: Any, messages: dict[str, list[bytes]]) -> None:
+        self._node = node
+        self._messages = messages
+        self._publishers = {
+            key: node.create_publisher(SAMPLE_TOPICS[topic], topic, sample_qos(4096))
+            for key, (topic, _) in TOPICS.items()
+        }
+
+    def wait_for(self, listeners: int) -> None:
+        """Wait until so many nodes listen on every topic."""
+        deadline = time.monotonic() + 20.0
+        publishers = self._publishers.values()
+        while min(publisher.get_subscription_count() for publisher in publishers) < listeners:
+            assert time.monotonic() < deadline, 'nobody listens'
+            time.sleep(0.02)
+
+    def feed(self, first: int = 0, last: int = SAMPLES) -> None:
+        """Publish samples, about five times as fast as real time."""
+        for n in range(first, last):
+            for key, publisher in self._publishers.items():
+                publisher.publish(self._messages[key][n])
+            if n % 5 == 0:
+                time.sleep(0.001)
+
+    def diagnose(self, level: bytes, name: str, text: str) -> None:
+        """Publish one status on /diagnostics."""
+        publisher = self._node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        while publisher.get_subscription_count() == 0:
+            time.sleep(0.02)
+        array = DiagnosticArray(status=[DiagnosticStatus(level=level, name=name, message=text)])
+        stamp_now(array.header.stamp)
+        publisher.publish(array)
+
+
+@pytest.fixture
+def feeder(observer: Observer, messages: dict[str, list[bytes]]) -> Feeder:
+    return Feeder(observer.node, messages)
+
+
+def start_monitor(nodes: Nodes, *arguments: str) -> Process:
+    output = nodes.folder / 'metrics.json'
+    return nodes.start('monitor', f'output:={output}', *arguments, params=('monitor.yaml',))
+
+
+def metrics(nodes: Nodes) -> Any:
+    return json.loads((nodes.folder / 'metrics.json').read_text())
+
+
+def recorded(path: Path) -> dict[str, int]:
+    """Samples in a bag by topic key."""
+    counts: dict[str, int] = dict.fromkeys(TOPICS, 0)
+    for batch in Bag(path).batches():
+        for key, records in batch.samples.items():
+            counts[key] += len(records)
+    return counts
+
+
+@pytest.mark.parametrize('stop', [signal.SIGINT, signal.SIGTERM])
+def test_bag_and_live_run_give_the_same_figures(
+    stop: signal.Signals, nodes: Nodes, feeder: Feeder
+) -> None:
+    bag = nodes.folder / 'bag'
+    recorder = nodes.start('recorder', f'output:={bag}', params=('monitor.yaml',))
+    monitor = start_monitor(nodes, 'scenario:=made_up', 'limits.max_overshoot:=99.0')
+    feeder.wait_for(2)
+    time.sleep(1.2)  # the monitor has told the recorder what is measured
+    feeder.feed()
+    assert monitor.wait() == 0, monitor.output
+    assert 'verdict: pass' in monitor.output
+    recorder.signal(stop)
+    assert recorder.wait() == 128 + stop
+    assert recorded(bag) == dict.fromkeys(TOPICS, SAMPLES)
+    assert analyse(bag).result == metrics(nodes)
+    assert metrics(nodes)['scenario'] == 'made_up'
+    assert metrics(nodes)['missing_samples'] == 0
+    with Reader(bag) as reader:
+        sampled: list[Any] = [c.ext for c in reader.connections if c.topic in SAMPLE_TOPICS]
+        assert all(e.offered_qos_profiles[0].reliability.name == 'RELIABLE' for e in sampled)
+
+
+def test_a_run_that_is_broken_off_leaves_what_there_was(nodes: Nodes, feeder: Feeder) -> None:
+    bag = nodes.folder / 'bag'
+    recorder = nodes.start('recorder', f'output:={bag}', 'flush_period:=0.1')
+    monitor = start_monitor(nodes)
+    feeder.wait_for(2)
+    feeder.feed(0, 1000)
+    time.sleep(0.4)
+    recorder.signal(signal.SIGKILL)
+    monitor.signal(signal.SIGTERM)
+    assert monitor.wait() == 143
+    assert metrics(nodes)['verdict'] == 'incomplete'
+    assert metrics(nodes)['run_samples'] > 900
+    assert recorder.wait() == 137
+    assert recorded(bag) == dict.fromkeys(TOPICS, 1000)
+    assert 'recovered' in analyse(bag).notes[0]
+
+
+def test_silence_ends_the_watch(nodes: Nodes, feeder: Feeder) -> None:
+    monitor = start_monitor(nodes, 'timeout:=1.0')
+    feeder.wait_for(1)
+    feeder.feed(0, 1000)
+    assert monitor.wait() == 1
+    assert 'the run has stopped: ' in monitor.output
+    assert 'silent for' in monitor.output
+    assert metrics(nodes)['verdict'] == 'incomplete'
+
+
+def test_a_fault_fails_the_run(nodes: Nodes, feeder: Feeder) -> None:
+    monitor = start_monitor(nodes, 'fault_grace:=0.2')
+    feeder.wait_for(1)
+    feeder.feed(0, 1000)
+    feeder.diagnose(DiagnosticStatus.WARN, 'controller', 'saturated')
+    feeder.diagnose(DiagnosticStatus.ERROR, 'plant', 'amplifier 3 is spent')
+    assert monitor.wait() == 1
+    assert 'fault in plant: amplifier 3 is spent' in monitor.output
+    assert metrics(nodes)['verdict'] == 'fail'
+    assert metrics(nodes)['faults'] == ['plant: amplifier 3 is spent']
+
+
+def test_who_is_missing_is_said(nodes: Nodes) -> None:
+    monitor = start_monitor(nodes, 'start_timeout:=1.0')
+    assert monitor.wait() == 1
+    said = 'the stage and the controller and the reference are not running'
+    assert said in monitor.output
+    assert metrics(nodes)['verdict'] == 'incomplete'
+
+
+def test_two_stages_are_noticed(
+    nodes: Nodes, feeder: Feeder, observer: Observer, messages: dict[str, list[bytes]]
+) -> None:
+    second = Feeder(observer.node, messages)
+    monitor = start_monitor(nodes)
+    second.wait_for(1)
+    assert monitor.wait() == 1
+    assert '2 nodes publish /' in monitor.output
+    assert 'stop all but one' in monitor.output
+
+
+def test_places_that_cannot_be_written_are_refused(nodes: Nodes) -> None:
+    (nodes.folder / 'file').write_text('')
+    recorder = nodes.start('recorder', f'output:={nodes.folder / "file" / "bag"}')
+    existing = nodes.start('recorder', f'output:={nodes.folder}')
+    monitor = nodes.start('monitor', f'output:={nodes.folder / "file" / "metrics.json"}')
+    for process, text in ((recorder, 'cannot write'), (existing, 'exists already'), (monitor, '')):
+        assert process.wait() == 1
+        assert text in process.output
+        assert 'error: ' in process.output
+        assert len(process.output.splitlines()) == 1, process.output

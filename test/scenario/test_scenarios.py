@@ -1,0 +1,176 @@
+"""The scenario scripts as a user runs them: what they print, leave behind and end with."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rosbags.rosbag2 import Reader
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+ROOT = Path(__file__).resolve().parents[2]
+MESSAGES = ROOT / 'src' / 'maglev_msgs' / 'msg'
+MARK = 'MAGLEV_SCENARIO_TEST'
+
+
+def command(scenario: str, out: Path, *options: str) -> list[str]:
+    return [str(ROOT / 'scenarios' / f'{scenario}.sh'), '--out', str(out), *options]
+
+
+def run(scenario: str, out: Path, *options: str) -> subprocess.CompletedProcess[str]:
+    """Run a scenario to its end, as a shell would, and show what it said if it goes wrong."""
+    done = subprocess.run(
+        command(scenario, out, *options), capture_output=True, text=True, timeout=240
+    )
+    print(done.stdout, done.stderr)
+    return done
+
+
+def metrics(out: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((out / 'metrics.json').read_text())
+    return found
+
+
+def recorded(out: Path, topic: str, *fields: str) -> np.ndarray:
+    """Rows of sequence and fields of a topic's messages, the last of each sequence."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    for path in MESSAGES.glob('*.msg'):
+        store.register(get_types_from_msg(path.read_text(), f'maglev_msgs/msg/{path.stem}'))
+    rows: dict[int, list[float]] = {}
+    with Reader(out / 'bag') as reader:
+        connections = [c for c in reader.connections if c.topic == topic]
+        for connection, _, data in reader.messages(connections=connections):
+            message = store.deserialize_cdr(data, connection.msgtype)
+            row = [float(message.sequence)]
+            for field in fields:
+                row.extend(np.atleast_1d(getattr(message, field)))
+            rows[message.sequence] = row
+    return np.array([rows[sequence] for sequence in sorted(rows)])
+
+
+def marked_processes(mark: str) -> list[str]:
+    """Command lines of the processes that carry a mark in their environment."""
+    found = []
+    for entry in Path('/proc').glob('[0-9]*'):
+        try:
+            if f'{MARK}={mark}'.encode() in (entry / 'environ').read_bytes().split(b'\0'):
+                found.append((entry / 'cmdline').read_bytes().replace(b'\0', b' ').decode())
+        except OSError:
+            continue
+    return found
+
+
+def test_ellipse_leaves_a_run_and_repeats_bit_for_bit(tmp_path: Path) -> None:
+    outs = tmp_path / 'first', tmp_path / 'second'
+    for out in outs:
+        done = run('ellipse_4dof', out, '--duration', '4')
+        assert done.returncode == 0
+        assert 'verdict: pass' in done.stdout
+    figures = metrics(outs[0])
+    assert figures['samples'] == 4000
+    assert figures['missing_samples'] == 0
+    assert figures['error_source'] == 'true'
+    for axis in ('y', 'x', 'z'):
+        assert figures['axes'][axis]['mean_abs_error'] < 4e-6
+    assert figures['axes']['theta']['mean_abs_error'] < 12e-6
+    for name in ('plant', 'controller', 'reference', 'monitor', 'recorder'):
+        assert (outs[0] / 'params' / f'{name}.yaml').stat().st_size > 0
+    report = (outs[0] / 'report.html').read_text()
+    assert 'http' not in report.replace('http://www.w3.org', ''), 'the report needs a network'
+    for topic, fields in (
+        ('/stage/true_state', ('state', 'direct_current', 'quadrature_current')),
+        ('/stage/measurement', ('gap', 'x', 'z')),
+        ('/stage/currents', ('direct_current', 'quadrature_current')),
+        ('/reference', ('position', 'velocity', 'acceleration')),
+    ):
+        first, second = (recorded(out, topic, *fields) for out in outs)
+        shared = min(len(first), len(second))
+        assert shared > figures['run_samples']
+        assert np.array_equal(first[:shared, 0], np.arange(shared))
+        assert np.array_equal(first[:shared], second[:shared]), f'{topic} differs'
+
+
+def test_the_paper_on_its_own_model(tmp_path: Path) -> None:
+    chosen = tmp_path / 'chosen.yaml'
+    chosen.write_text(
+        'reference: {ros__parameters: {duration: 4.0, steps: {'
+        "axis: ['y', 'theta', 'x'], start: [0.02, 0.0, 0.0], target: [0.027, 0.01, 0.03]}}}\n"
+        'monitor: {ros__parameters: {limits: {min_steps: 3}}}\n'
+    )
+    overlays = [f'--params={name}' for name in ('ideal', 'paper', str(chosen))]
+    assert run('steps', tmp_path / 'run', *overlays).returncode == 0
+    lifted, tilted, moved = metrics(tmp_path / 'run')['steps']
+    assert lifted['overshoot_percent'] == pytest.approx(16.0, abs=1.0)
+    assert lifted['settling_time'] == pytest.approx(2.0, abs=0.1)
+    assert tilted['overshoot_percent'] == pytest.approx(22.0, abs=1.5)
+    assert moved['overshoot_percent'] == pytest.approx(23.7, abs=1.0)
+
+
+def test_real_time_with_everything_running(tmp_path: Path) -> None:
+    done = run('ellipse', tmp_path / 'run', '--mode', 'realtime', '--duration', '4')
+    assert done.returncode == 0
+    figures = metrics(tmp_path / 'run')
+    assert figures['timing']['real_time_factor'] == pytest.approx(1.0, abs=0.02)
+    assert figures['missing_samples'] == 0
+    assert 'late_samples' in figures['timing']
+
+
+def test_a_limit_that_is_not_kept_fails(tmp_path: Path) -> None:
+    strict = tmp_path / 'strict.yaml'
+    strict.write_text(
+        'monitor: {ros__parameters: {limits: {max_mean_error: [1.0e-9, -1.0, -1.0, -1.0, -1.0]}}}\n'
+    )
+    done = run('ellipse', tmp_path / 'run', '--duration', '1', '--params', str(strict))
+    assert done.returncode == 1
+    assert 'verdict: fail' in done.stdout
+    assert metrics(tmp_path / 'run')['verdict'] == 'fail'
+
+
+def test_a_reference_out_of_range_is_refused_before_anything_moves(tmp_path: Path) -> None:
+    wrong = tmp_path / 'wrong.yaml'
+    wrong.write_text('reference: {ros__parameters: {sinusoids: {x: {amplitude: [0.06]}}}}\n')
+    done = run('ellipse', tmp_path / 'run', '--params', str(wrong))
+    assert done.returncode not in (0, 2)
+    assert 'x' in done.stderr
+    assert '0.06' in done.stderr
+    assert (
+        np.ptp(recorded(tmp_path / 'run', '/stage/true_state', 'state')[:, 1]) == 0.0
+        or not (tmp_path / 'run' / 'bag').exists()
+    )
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_however_it_is_ended_nothing_stays(tmp_path: Path, number: signal.Signals) -> None:
+    out, mark = tmp_path / 'run', str(tmp_path)
+    with (tmp_path / 'log').open('wb') as log:
+        script = subprocess.Popen(
+            command('ellipse', out),
+            stdout=log,
+            stderr=log,
+            env={**os.environ, MARK: mark},
+            start_new_session=True,
+        )
+    deadline = time.monotonic() + 60
+    while 'TRACK' not in (tmp_path / 'log').read_text():
+        assert script.poll() is None
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
+    script.send_signal(number)
+    code = script.wait(60)
+    if number != signal.SIGKILL:
+        assert code == 128 + number
+        assert metrics(out)['verdict'] == 'incomplete'
+        states = recorded(out, '/stage/true_state', 'state')
+        assert states[-1, 1] == pytest.approx(0.031, abs=2e-5), 'it did not land'
+    deadline = time.monotonic() + 20
+    while marked_processes(mark):
+        assert time.monotonic() < deadline, marked_processes(mark)
+        time.sleep(0.1)
+    assert len(recorded(out, '/stage/measurement', 'x')) > 5000

