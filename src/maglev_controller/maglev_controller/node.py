@@ -198,6 +198,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         supervisor = self.supervisor
         if supervisor.flying and supervisor.mode != Mode.LANDING:
             supervisor.disable()
+            self._answer_pending()
         silent = time.monotonic() - self._answered > _SILENCE
         return not supervisor.flying or silent
 

@@ -50,6 +50,8 @@ def _axis_reasons(found: Mapping[str, Any], limits: Limits) -> Iterator[str]:
     for name, title, bounds in rows:
         for axis, bound in zip(AXES, bounds, strict=True):
             value = found['axes'][axis][name]
+            if value is None and found['steps']:
+                continue  # a run of steps tracks nothing
             if bound < 0 or (value is not None and value <= bound):
                 continue
             if value is None:
