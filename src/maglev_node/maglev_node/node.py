@@ -151,11 +151,17 @@ class MaglevNode(Node, Generic[P]):
         if len(self._claims) == 1:
             self._probation = self.create_timer(0.25, self._look_again, clock=self.steady_clock)
 
-    def _look_again(self) -> None:
+    def alone(self) -> bool:
+        """Whether what was claimed still has one publisher; otherwise the node ends."""
         for topic, what in self._claims.items():
             names = [info.node_name for info in self.get_publishers_info_by_topic(topic)]
             if len(names) > 1:
                 self.fail(self._taken(topic, what, names[0]))
+                return False
+        return True
+
+    def _look_again(self) -> None:
+        self.alone()
         if time.monotonic() - self._started > _PROBATION:
             self._probation.cancel()
 
