@@ -16,5 +16,10 @@ setup(
     maintainer_email='maintainers@maglev-stage.org',
     description='Nonlinear regulator of the maglev stage, and its node',
     license='Apache-2.0',
-    entry_points={'console_scripts': ['controller = maglev_controller.node:main']},
+    entry_points={
+        'console_scripts': [
+            'controller = maglev_controller.node:main',
+            'compare = maglev_controller.comparison.main:main',
+        ]
+    },
 )

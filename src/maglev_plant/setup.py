@@ -16,5 +16,10 @@ setup(
     maintainer_email='maintainers@maglev-stage.org',
     description='The plant of the maglev stage: physics, encoders, amplifiers, and its node',
     license='Apache-2.0',
-    entry_points={'console_scripts': ['plant = maglev_plant.node:main']},
+    entry_points={
+        'console_scripts': [
+            'plant = maglev_plant.node:main',
+            'terms = maglev_plant.terms_cli:main',
+        ]
+    },
 )

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from graph import Nodes, Observer, Process
 
-from maglev_msgs.msg import ControllerState
+from maglev_msgs.msg import ControllerState, Reference
 from maglev_node.topics import CONTROLLER_STATE, CURRENTS, MEASUREMENT, REFERENCE, TRUE_STATE
 
 ELLIPSE = 'scenario_ellipse.yaml'
@@ -148,6 +148,35 @@ def test_real_time(nodes: Nodes, watching: Observer) -> None:
     measurements = watching.look()[MEASUREMENT]
     wall = measurements[-1].header.stamp.sec - measurements[0].header.stamp.sec
     assert wall == pytest.approx(len(measurements) * 1e-3, abs=2.0)
+    assert 'currents cut' not in graph['plant'].output
+
+
+@pytest.mark.parametrize('mode', ['lockstep', 'realtime'])
+def test_retuning_in_flight_is_checked_and_bumpless(
+    nodes: Nodes, watching: Observer, mode: str
+) -> None:
+    graph = fly(nodes, LONG, mode=mode)
+    watching.wait(lambda: watching.newest(REFERENCE) is not None)
+    watching.wait(lambda: watching.newest(REFERENCE).phase == Reference.TRACK)
+    for refused, said in (
+        ({'x__weight_error': 1e30}, 'weight_error'),
+        ({'machine__mass_y': 7.5}, 'mass_y'),
+        ({'y__weight_error': 'much'}, 'type'),
+    ):
+        answer = watching.set_parameters('controller', **refused)
+        assert not answer.successful
+        assert said in answer.reason
+    done = watching.set_parameters('controller', y__weight_rate=6.0e4, x__weight_rate=6.0e4)
+    assert done.successful, done.reason
+    after = watching.newest(CONTROLLER_STATE).sequence + 1000
+    watching.wait(lambda: watching.newest(CONTROLLER_STATE).sequence > after)
+    tracking = [
+        message
+        for message in watching.look()[CONTROLLER_STATE]
+        if message.sequence > after - 3000 and message.mode == ControllerState.REGULATING
+    ]
+    assert tracking[-1].sequence > after - 5, graph['controller'].output
+    assert np.max(np.abs([message.error[:3] for message in tracking])) < 50e-6
     assert 'currents cut' not in graph['plant'].output
 
 

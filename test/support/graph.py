@@ -13,7 +13,10 @@ from typing import Any
 
 import rclpy
 from ament_index_python.packages import get_package_prefix
+from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.parameter import Parameter
+from rclpy.task import Future
 from std_srvs.srv import SetBool, Trigger
 
 from maglev_node.polling import PolledSubscription, Queues
@@ -145,10 +148,35 @@ class Observer:
         request = service_type.Request()
         if data is not None:
             request.data = data
+        return self.ask(client, request)
+
+    def ask(self, client: Any, request: Any) -> Any:
+        """The answer of any service."""
+        assert client.wait_for_service(timeout_sec=10.0), f'there is no {client.srv_name}'
         future = client.call_async(request)
         self._executor.spin_until_future_complete(future, timeout_sec=10.0)
-        assert future.done(), f'{service} never answered'
+        assert future.done(), f'{client.srv_name} never answered'
         return future.result()
+
+    def serve(self, duration: float) -> None:
+        """Let callbacks of the test's own run."""
+        self._executor.spin_until_future_complete(Future(), timeout_sec=duration)
+
+    def set_parameters(self, node: str, **values: Any) -> Any:
+        """Set parameters of a node all at once; ``__`` in a name stands for a dot."""
+        client = self.node.create_client(
+            SetParametersAtomically, f'/{node}/set_parameters_atomically'
+        )
+        assert client.wait_for_service(timeout_sec=10.0)
+        request = SetParametersAtomically.Request()
+        request.parameters = [
+            Parameter(name.replace('__', '.'), value=value).to_parameter_msg()
+            for name, value in values.items()
+        ]
+        future = client.call_async(request)
+        self._executor.spin_until_future_complete(future, timeout_sec=20.0)
+        assert future.done(), f'{node} never answered'
+        return future.result().result
 
     def close(self) -> None:
         """Leave the graph."""

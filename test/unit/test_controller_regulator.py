@@ -142,7 +142,7 @@ def test_a_jump_of_the_set_point_has_no_rate(name: str) -> None:
 
 def test_error_rate_of_a_smooth_reference_is_the_filtered_rate_of_the_error() -> None:
     """Position and reference through the same filter: their difference is that of e itself."""
-    bench = Bench()
+    bench = Bench(build(ControllerParameters, {'rate_estimate': 'derivative'}))
     gain, forget = bench.regulator.designs[0].derivative
     time = 1e-3 * np.arange(400)
     position = 0.025 + 0.002 * np.sin(9.0 * time)

@@ -60,8 +60,10 @@ def _loop(
     state: FloatArray,
     current: FloatArray,
     code: NDArray[np.int8],
+    delayed: bool,
 ) -> int:
     """All samples, or up to the first that the regulator refuses; returns how many went well."""
+    answer = np.zeros(8)
     for k in range(position.shape[0]):
         for i in range(10):
             state[k, i] = stage.memory[STATE + i]
@@ -79,21 +81,31 @@ def _loop(
             position[k],
             velocity[k],
             acceleration[k],
-            stage.command[:4],
-            stage.command[4:],
+            answer[:4],
+            answer[4:],
         )
         if code[k] > law.SATURATED:
             return k
+        if delayed:
+            advance(stage.scalars, stage.axes, stage.memory, stage.command)
         for i in range(8):
-            current[k, i] = stage.command[i]
-        advance(stage.scalars, stage.axes, stage.memory, stage.command)
+            stage.command[i] = current[k, i] = answer[i]
+        if not delayed:
+            advance(stage.scalars, stage.axes, stage.memory, stage.command)
     return int(position.shape[0])
 
 
-def run(regulator: Regulator, stage: SimulatedStage, references: References) -> Run:
+def run(
+    regulator: Regulator,
+    stage: SimulatedStage,
+    references: References,
+    *,
+    delayed: bool = False,
+) -> Run:
     """Carry the stage along a reference, from the sample it stands at; both keep their states.
 
-    Bit for bit what :meth:`Regulator.step` and the stage's ``read`` and ``write`` give in turn.
+    With ``delayed`` the currents take effect one sample late, as in real time. Otherwise this is
+    bit for bit what :meth:`Regulator.step` and the stage's ``read`` and ``write`` give in turn.
     Raises ValueError for references of another shape than (n, 5), and :class:`MeasurementFault`,
     naming the sample, when the regulator refuses one.
     """
@@ -107,7 +119,9 @@ def run(regulator: Regulator, stage: SimulatedStage, references: References) -> 
     state, current = np.empty((n, 10)), np.empty((n, 8))
     code = np.zeros(n, dtype=np.int8)
     arrays = stage.arrays
-    done = _loop(regulator.arrays, arrays, position, velocity, acceleration, state, current, code)
+    done = _loop(
+        regulator.arrays, arrays, position, velocity, acceleration, state, current, code, delayed
+    )
     if done < n:
         gap, x, z = arrays.reading[:4], float(arrays.reading[4]), float(arrays.reading[5])
         raise MeasurementFault(f'sample {done}: {regulator.describe(int(code[done]), gap, x, z)}')

@@ -1,7 +1,7 @@
 """Gains of one axis: the double integrator (13) with its internal model (14) made stable by (16).
 
-Everything here runs once, at configuration. What cannot be stabilised, or what the sampled loop
-with its derivative filter would not hold, is refused with the reason.
+Everything here runs once, at configuration. What cannot be stabilised is refused with the reason;
+what the sampled loop as a whole does is computed in :mod:`maglev_controller.margins`.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from maglev_controller.internal_model import (
     discretise,
     internal_model,
 )
+from maglev_controller.observer import NO_OBSERVER, Observer, observer
 from maglev_controller.parameters import AxisParameters, ControllerParameters
 from maglev_node.parameters import ParameterError
 
@@ -30,8 +31,8 @@ ComplexArray = NDArray[np.complex128]
 class Weights:
     """LQR weights, all on diagonals: of e, of ė, of each mode of the internal model, and of w.
 
-    ``model`` has one value for all modes, or one per frequency (modal form) or per state
-    (companion).
+    ``model`` has one value for all modes; or, in modal form, two, of the integrator and of the
+    oscillators, or one per frequency; or, in companion form, one per state.
     """
 
     error: float
@@ -45,7 +46,9 @@ class AxisDesign:
     """One axis ready to run at its sample time; n is the order of the internal model.
 
     ``gain`` K (n + 2,) of (16), ``total_gain`` the same with Γ added, ``transition`` Φ_d (n, n),
-    ``drive`` N_d (n,), ``antiwindup`` E_d (n,), ``spectral_radius`` of the sampled closed loop.
+    ``drive`` N_d (n,), ``antiwindup`` E_d (n,); rates come from ``observer`` where there is one.
+    ``stiffness`` α [1/s²] of the plant ë = α e + w that it is designed for: 0 where the inverse
+    takes all of it away.
     """
 
     model: InternalModel
@@ -55,14 +58,15 @@ class AxisDesign:
     drive: FloatArray
     antiwindup: FloatArray
     derivative: DerivativeFilter
-    spectral_radius: float
+    observer: Observer = NO_OBSERVER
+    stiffness: float = 0.0
 
 
 def design_axis(parameters: ControllerParameters, axis: str) -> AxisDesign:
     """Design the axis named ``axis``: y, x, z, phi or theta.
 
     Raises :class:`ParameterError`, naming the axis and the reason, for a choice that has no
-    stabilising gain, or whose sampled loop, derivative filter included, is not stable.
+    stabilising gain.
     """
     own: AxisParameters = getattr(parameters, axis)
     shared, period = parameters.internal_model, parameters.sample_time
@@ -74,12 +78,14 @@ def design_axis(parameters: ControllerParameters, axis: str) -> AxisDesign:
             f'of what a sample time of {period:g} s can hold ({np.pi / period:g} rad/s)'
         )
     gain = _gain(own, model, period, axis)
+    if shared.friction_slope > 0.0 and own.design != 'poles' and model.form == 'modal':
+        gain = split_phase(model, gain, shared.friction_slope)
     total = gain.copy()
     total[2:] += model.output
     derivative = derivative_filter(
         parameters.derivative.bandwidth, period, parameters.derivative.discretisation
     )
-    radius = check_sampled_loop(sampled_loop(model, gain, derivative, period), axis, period)
+    watched = parameters.rate_estimate == 'observer'
     inputs = np.stack([model.input, _paper_antiwindup(own, model, axis)], axis=1)
     transition, driven = discretise(model.state, inputs, period)
     antiwindup = np.zeros(model.order)
@@ -87,7 +93,16 @@ def design_axis(parameters: ControllerParameters, axis: str) -> AxisDesign:
         antiwindup = driven[:, 1]
     elif shared.antiwindup == 'observer':
         antiwindup = observer_gain(model, total, period, shared.antiwindup_speed)
-    return AxisDesign(model, gain, total, transition, driven[:, 0], antiwindup, derivative, radius)
+    return AxisDesign(
+        model=model,
+        gain=gain,
+        total_gain=total,
+        transition=transition,
+        drive=driven[:, 0],
+        antiwindup=antiwindup,
+        derivative=derivative,
+        observer=observer(parameters.observer.bandwidth, period) if watched else NO_OBSERVER,
+    )
 
 
 def _gain(own: AxisParameters, model: InternalModel, period: float, axis: str) -> FloatArray:
@@ -221,19 +236,34 @@ def dlqr(model: InternalModel, weights: Weights, period: float, axis: str = 'axi
     return np.asarray(-(row @ state) / (effort[0, 0] + row @ drive))
 
 
-def _cost(model: InternalModel, weights: Weights, axis: str) -> tuple[FloatArray, FloatArray]:
-    given = np.array(weights.model, dtype=np.float64)
-    per_mode = model.frequencies.size if model.form == 'modal' else model.order
-    if given.size not in (1, per_mode) and model.order:
-        raise ParameterError(
-            f"{axis}: 'weight_model' has {given.size} elements, this internal model takes 1 "
-            f'or {per_mode}'
+def split_phase(model: InternalModel, gain: FloatArray, slope: float) -> FloatArray:
+    """K (n + 2,) with every oscillator turned half-way to where friction at rest wants it.
+
+    Around standstill friction is as good as viscous, with a large slope: it delays the answer of
+    the axis at an oscillator's ω from the angle of 1 / (k_p − ω² + i ω k_d), which the LQR gains
+    count on, towards −90°. An oscillator is damped by its loop as long as it is less than 90° off,
+    so with gains for the one it is left undamped at the other, and platen and oscillator hunt. Half
+    the difference, for friction of ``slope`` [1/s], serves both.
+    """
+    turned: FloatArray = gain.copy()
+    for index, omega in enumerate(model.frequencies):
+        if omega == 0.0:
+            continue
+        moving = -gain[0] - omega**2 - 1j * omega * gain[1]
+        turn = 0.5 * np.angle((moving + 1j * omega * slope) / moving)
+        rows = np.nonzero(model.mode == index)[0]
+        first, second = gain[2 + rows] + model.output[rows]
+        turned[2 + rows] = (
+            np.cos(turn) * first - np.sin(turn) * second,
+            np.cos(turn) * second + np.sin(turn) * first,
         )
-    if given.size == 1:
-        on_states = np.full(model.order, given[0])
-    else:
-        on_states = given[model.mode] if model.form == 'modal' else given
-    cost = np.concatenate(([weights.error, weights.rate], on_states))
+        turned[2 + rows] -= model.output[rows]
+    return turned
+
+
+def _cost(model: InternalModel, weights: Weights, axis: str) -> tuple[FloatArray, FloatArray]:
+    on_states = _model_weights(model, np.array(weights.model, dtype=np.float64), axis)
+    cost: FloatArray = np.concatenate(([weights.error, weights.rate], on_states))
     if np.any(cost < 0.0) or not weights.effort > 0.0:
         raise ParameterError(f'{axis}: LQR weights must be at least 0, and the one on w above 0')
     if np.any(on_states == 0.0):
@@ -244,6 +274,25 @@ def _cost(model: InternalModel, weights: Weights, axis: str) -> tuple[FloatArray
     return cost, np.array([[weights.effort]])
 
 
+def _model_weights(model: InternalModel, given: FloatArray, axis: str) -> FloatArray:
+    """A weight for each internal-model state, from as many as are given."""
+    each: FloatArray
+    modal = model.form == 'modal'
+    if given.size == 1:
+        return np.full(model.order, float(given[0]))
+    if modal and given.size == 2:
+        each = np.where(model.frequencies == 0.0, given[0], given[1])[model.mode]
+        return each
+    expected = model.frequencies.size if modal else model.order
+    if given.size != expected:
+        raise ParameterError(
+            f"{axis}: 'weight_model' has {given.size} elements, this internal model takes 1"
+            f'{", 2" if modal else ""} or {expected}'
+        )
+    each = given[model.mode] if modal else given
+    return each
+
+
 def _no_gain(axis: str, error: Exception) -> ParameterError:
     return ParameterError(f'{axis}: these LQR weights admit no stabilising gain ({error})')
 
@@ -252,52 +301,6 @@ def closed_loop_poles(model: InternalModel, gain: FloatArray) -> ComplexArray:
     """Poles (n + 2,) [rad/s] of the continuous closed loop of (13), (14), (16)."""
     state, drive = augmented(model)
     return np.asarray(np.linalg.eigvals(state + np.outer(drive, gain)), dtype=np.complex128)
-
-
-def sampled_loop(
-    model: InternalModel,
-    gain: FloatArray,
-    derivative: DerivativeFilter,
-    period: float,
-    delay: int = 0,
-) -> FloatArray:
-    """The closed loop as it runs at sample time ``period`` [s], derivative filter included.
-
-    State (e, ė, ξ, f, the last ``delay`` inputs); returns its transition matrix.
-    """
-    n = model.order
-    size = n + 3 + delay
-    open_loop, drive = augmented_discrete(model, period)
-    open_loop[:2, 2:] = 0.0
-    feedback = np.zeros(size)
-    feedback[0] = gain[0] + gain[1] * derivative.gain
-    feedback[n + 2] = -gain[1] * derivative.gain
-    feedback[2 : n + 2] = gain[2:] + model.output
-    transition = np.zeros((size, size))
-    transition[: n + 2, : n + 2] = open_loop
-    transition[n + 2, 0], transition[n + 2, n + 2] = derivative.forget, 1.0 - derivative.forget
-    if delay == 0:
-        transition[:2] += np.outer(drive[:2], feedback)
-        return transition
-    transition[:2, n + 3] = drive[:2]
-    for step in range(delay - 1):
-        transition[n + 3 + step, n + 4 + step] = 1.0
-    transition[-1] = feedback
-    return transition
-
-
-def check_sampled_loop(loop: FloatArray, axis: str, period: float) -> float:
-    """Spectral radius of ``loop``; raises :class:`ParameterError` when it is not below 1."""
-    values = np.linalg.eigvals(loop)
-    radius = float(np.max(np.abs(values)))
-    if not radius < 1.0:
-        worst = values[np.argmax(np.abs(values))]
-        raise ParameterError(
-            f'{axis}: with these gains and this derivative filter the loop is unstable at a sample '
-            f'time of {period:g} s (largest pole |z| = {radius:.4f} at '
-            f'{abs(np.angle(worst)) / period:.4g} rad/s)'
-        )
-    return radius
 
 
 def observer_gain(

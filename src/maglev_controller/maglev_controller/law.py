@@ -11,10 +11,12 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from maglev_controller.equilibrium import equilibrium_inverse
 from maglev_controller.inverse import Limits, exact_inverse, simplified_inverse
 from maglev_controller.profile import quintic_to_zero, transition_time
+from maglev_controller.single_motor import single_motor_inverse
 from maglev_plant.compiled import compiled
-from maglev_plant.machine import machine_from_array
+from maglev_plant.machine import Machine, machine_from_array
 from maglev_plant.platen import outputs_from_gaps
 
 FloatArray = NDArray[np.float64]
@@ -36,7 +38,7 @@ TRANSITION: Final = 3
 FILTER_GAIN: Final = 0  # [1/s]
 FILTER_FORGET: Final = 1
 FEED_FORWARD: Final = 2
-EXACT: Final = 3
+INVERSE: Final = 3  # one of INVERSES, by its number
 PAPER_ANTIWINDUP: Final = 4
 CURRENT: Final = 5  # [A]
 LEVITATION_FIRST: Final = 6
@@ -47,7 +49,19 @@ JUMP_TIME: Final = 10  # [s]
 CONTROLLED: Final = 11  # five
 RANGE: Final = 16  # lower and upper bound of each axis
 JUMP_ACCELERATION: Final = 26  # five
-SETTINGS: Final = 31
+EQUILIBRIUM: Final = 31  # air gap [m]
+OBSERVER: Final = 32  # 1: rates come from the observer, 0: from the derivative filter
+OBSERVER_POSITION: Final = 33
+OBSERVER_VELOCITY: Final = 34  # [1/s]
+AHEAD: Final = 35  # 1: the observer predicts one sample, as the currents come that late
+FADE: Final = 36  # share of a bump that is left a sample later
+LARGEST_ERROR: Final = 37  # that an internal model learns from; five
+ERROR_LIMIT: Final = 42  # of the error that is fed back; five
+SETTINGS: Final = 47
+
+INVERSES: Final = ('simplified', 'exact', 'equilibrium')
+SIMPLIFIED: Final = 0
+EXACT: Final = 1
 
 # Columns of an axis' state.
 FRESH: Final = 0  # 1 before the first sample
@@ -59,7 +73,12 @@ LAST_SPEED: Final = 5  # of the reference with jumps made good
 DURATION: Final = 6  # of the transition that makes a jump good
 ELAPSED: Final = 7
 OFFSET: Final = 8  # position, velocity, acceleration at its start
-MODEL: Final = 11  # ξ
+ESTIMATE: Final = 11  # position and velocity, predicted for this sample
+PENDING: Final = 13  # acceleration commanded that has yet to act, where the currents come late
+LAST_ERROR: Final = 14  # as w used it
+LAST_ACCELERATION: Final = 15  # of the reference
+BUMP: Final = 16  # share of w that fades, so that w does not jump when gains change
+MODEL: Final = 17  # ξ
 
 # Rows of the telemetry, and of the scratch space.
 POSITION: Final = 0
@@ -133,6 +152,31 @@ def _follow_jump(
 
 
 @compiled
+def _observe(settings: FloatArray, own: FloatArray, measured: float) -> tuple[float, float]:
+    """Position and velocity when w acts: the prediction, corrected with what is measured."""
+    surprise = measured - own[ESTIMATE]
+    own[ESTIMATE] += settings[OBSERVER_POSITION] * surprise
+    own[ESTIMATE + 1] += settings[OBSERVER_VELOCITY] * surprise
+    position, velocity = own[ESTIMATE], own[ESTIMATE + 1]
+    if settings[AHEAD] != 0.0:
+        period, push = settings[PERIOD], own[PENDING]
+        position += period * (velocity + 0.5 * period * push)
+        velocity += period * push
+    return position, velocity
+
+
+@compiled
+def _predict(settings: FloatArray, own: FloatArray, realised: float) -> None:
+    """Carry the estimate over to the next sample, its input known."""
+    acting = realised
+    if settings[AHEAD] != 0.0:
+        acting, own[PENDING] = own[PENDING], realised
+    period = settings[PERIOD]
+    own[ESTIMATE] += period * (own[ESTIMATE + 1] + 0.5 * period * acting)
+    own[ESTIMATE + 1] += period * acting
+
+
+@compiled
 def _virtual_inputs(
     law: FloatArray,
     settings: FloatArray,
@@ -165,14 +209,25 @@ def _virtual_inputs(
             velocity[axis],
             speed,
         )
-        change = measured - own[FILTER]
-        own[FILTER] += forget * change
-        used_error[axis] = measured - position[axis] - offset
-        error_rate = gain * change - own[LAGGED]
+        error = measured - position[axis] - offset
+        limit = settings[LARGEST_ERROR + axis]
+        used_error[axis] = min(max(error, -limit), limit)
+        if settings[OBSERVER] != 0.0:
+            if fresh:
+                own[ESTIMATE], own[ESTIMATE + 1], own[PENDING] = measured, 0.0, 0.0
+            seen, rate_seen = _observe(settings, own, measured)
+            error, error_rate = seen - position[axis] - offset, rate_seen - speed
+        else:
+            change = measured - own[FILTER]
+            own[FILTER] += forget * change
+            error_rate = gain * change - own[LAGGED]
         share = 0.0
         for index in range(states):
             share += law[axis, GAIN, 2 + index] * own[MODEL + index]
-        w = law[axis, GAIN, 0] * used_error[axis] + law[axis, GAIN, 1] * error_rate + share
+        error = min(max(error, -settings[ERROR_LIMIT + axis]), settings[ERROR_LIMIT + axis])
+        own[LAST_ERROR], own[LAST_ACCELERATION] = error, acceleration[axis]
+        own[BUMP] *= settings[FADE]
+        w = law[axis, GAIN, 0] * error + law[axis, GAIN, 1] * error_rate + share + own[BUMP]
         telemetry[ERROR, axis] = measured - position[axis]
         telemetry[ERROR_RATE, axis] = error_rate
         telemetry[INTERNAL_MODEL, axis] = share
@@ -194,6 +249,8 @@ def _advance_models(
     states = state.shape[1] - MODEL
     paper = settings[PAPER_ANTIWINDUP] != 0.0
     for axis in range(5):
+        if settings[OBSERVER] != 0.0:
+            _predict(settings, state[axis], realised[axis])
         if settings[CONTROLLED + axis] == 0.0:
             continue
         error = used_error[axis]
@@ -208,6 +265,38 @@ def _advance_models(
             new[row] = value
         for row in range(states):
             state[axis, MODEL + row] = new[row]
+
+
+@compiled
+def _currents(
+    machine: Machine,
+    settings: FloatArray,
+    output: FloatArray,
+    wanted: FloatArray,
+    direct: FloatArray,
+    quadrature: FloatArray,
+    realised: FloatArray,
+    excess: FloatArray,
+) -> bool:
+    """The inverse of the settings; see the module ``inverse`` for the arguments."""
+    limits = Limits(settings[CURRENT], settings[LEVITATION_FIRST], settings[LEAST_ATTRACTION])
+    controlled = settings[CONTROLLED : CONTROLLED + 5]
+    if machine.motors == 1.0:
+        return single_motor_inverse(
+            machine, limits, controlled, output, wanted, direct, quadrature, realised, excess
+        )
+    if settings[INVERSE] == EXACT:
+        return exact_inverse(
+            machine, limits, controlled, output, wanted, direct, quadrature, realised, excess
+        )
+    if settings[INVERSE] == SIMPLIFIED:
+        return simplified_inverse(
+            machine, limits, controlled, output, wanted, direct, quadrature, realised, excess
+        )
+    gap = settings[EQUILIBRIUM]
+    return equilibrium_inverse(
+        machine, limits, controlled, gap, wanted, direct, quadrature, realised, excess
+    )
 
 
 @compiled
@@ -248,19 +337,11 @@ def control_step(
     for axis in range(5):
         telemetry[POSITION, axis] = output[axis]
     _virtual_inputs(law, settings, state, telemetry, position, velocity, acceleration, used_error)
-    limits = Limits(settings[CURRENT], settings[LEVITATION_FIRST], settings[LEAST_ATTRACTION])
-    controlled = settings[CONTROLLED : CONTROLLED + 5]
-    wanted = telemetry[VIRTUAL_INPUT]
-    if settings[EXACT] != 0.0:
-        saturated = exact_inverse(
-            machine, limits, controlled, output, wanted, direct, quadrature, realised, excess
-        )
-    else:
-        saturated = simplified_inverse(
-            machine, limits, controlled, output, wanted, direct, quadrature, realised, excess
-        )
+    saturated = _currents(
+        machine, settings, output, telemetry[VIRTUAL_INPUT], direct, quadrature, realised, excess
+    )
     if not saturated:
         for axis in range(5):
-            realised[axis] = wanted[axis]
+            realised[axis] = telemetry[VIRTUAL_INPUT, axis]
     _advance_models(law, settings, state, telemetry, realised, excess, used_error, new)
     return SATURATED if saturated else OK

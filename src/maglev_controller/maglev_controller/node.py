@@ -15,10 +15,11 @@ from maglev_controller.supervision import Mode, Phase, Supervisor
 from maglev_msgs.msg import ControllerState, Currents, Measurement, Reference
 from maglev_node.node import MaglevNode, SourceParameters
 from maglev_node.node import main as run_main
-from maglev_node.parameters import ParameterError, parameter
+from maglev_node.parameters import build, parameter, specs, values
 from maglev_node.stamp import copy_stamp, stamp_now
 from maglev_node.topics import CONTROLLER_STATE, CURRENTS, MEASUREMENT, REFERENCE, sample_qos
 
+_HAND_PERIOD = 2e-4  # between two looks at the queues during a redesign [s]
 _SILENCE = 0.5  # without a sample for this long the stage is taken for stopped [s]
 
 
@@ -26,21 +27,8 @@ _SILENCE = 0.5  # without a sample for this long the stage is taken for stopped 
 class ControllerNodeParameters(SourceParameters, ControllerParameters):
     """The regulator and how its node runs it."""
 
-    mode: str = parameter(
-        'lockstep',
-        choices=('lockstep', 'realtime'),
-        description='lockstep: wait for the reference of each sample; realtime: never wait',
-        read_only=True,
-    )
     enabled: bool = parameter(
         True, description='follow the reference from the start; false: after ~/enable'
-    )
-    realtime_priority: int = parameter(
-        40,
-        lower=0,
-        upper=98,
-        description='realtime: SCHED_FIFO priority of the process, where permitted; 0: none',
-        read_only=True,
     )
     reference_timeout: float = parameter(
         2.0,
@@ -67,7 +55,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
 
     def __init__(self) -> None:
         super().__init__('controller', ControllerNodeParameters)
-        self.supervisor = Supervisor(self.parameters, enabled=self.parameters.enabled)
+        self.supervisor = Supervisor(self._law(self.parameters), enabled=self.parameters.enabled)
         self._lockstep = self.parameters.mode == 'lockstep'
         self._longest_gap = self.parameters.measurement_timeout / self.parameters.sample_time
         self._sequence = -1
@@ -82,14 +70,21 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         self._state_publisher = self.create_publisher(
             ControllerState, CONTROLLER_STATE, sample_qos()
         )
-        self.create_subscription(Reference, REFERENCE, self._on_reference, sample_qos())
-        self.create_subscription(Measurement, MEASUREMENT, self._on_measurement, sample_qos())
+        newest = sample_qos() if self._lockstep else sample_qos(depth=1)
+        self._loop = tuple(
+            (self.create_subscription(message_type, topic, callback, qos), callback)
+            for message_type, topic, callback, qos in (
+                (Reference, REFERENCE, self._on_reference, sample_qos()),
+                (Measurement, MEASUREMENT, self._on_measurement, newest),
+            )
+        )
         self.create_service(SetBool, '~/enable', self._on_enable)
         self.create_service(Trigger, '~/emergency_stop', self._on_emergency_stop)
         self.create_service(Trigger, '~/reset', self._on_reset)
         self.create_timer(0.05, self._watch, clock=self.steady_clock)
-        if not self._lockstep:
-            self.take_realtime_priority(self.parameters.realtime_priority)
+        self.take_realtime_priority()
+        for line in self.supervisor.regulator.describe_loops():
+            self.get_logger().info(line)
         # The first line a process logs takes 20 ms, so it must not be one that is logged in flight.
         self.get_logger().info(f'{self.parameters.mode}, waiting for {MEASUREMENT}')
 
@@ -224,11 +219,30 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
             self._answer(self._pending)
 
     def on_parameters(self, parameters: ControllerNodeParameters) -> None:
-        """Gains, models and limits change between flights."""
-        if self.supervisor.flying:
-            raise ParameterError('the controller takes parameters on the ground only; land first')
-        self.supervisor.retune(parameters)
+        """Redesign in another process, serving the loop, and change over between two samples."""
+        law = self._law(parameters)
+        if law != self.supervisor.parameters:
+            redesign = self.supervisor.redesign(law)
+            while not redesign.done:
+                self._serve_by_hand()
+                time.sleep(_HAND_PERIOD)
+            self.supervisor.adopt(*redesign.result())
         self._longest_gap = parameters.measurement_timeout / parameters.sample_time
+
+    @staticmethod
+    def _law(parameters: ControllerNodeParameters) -> ControllerParameters:
+        """The node's parameters without those that are only the node's."""
+        table = specs(ControllerParameters)
+        return build(
+            ControllerParameters, {k: v for k, v in values(parameters).items() if k in table}
+        )
+
+    def _serve_by_hand(self) -> None:
+        """What the executor does for the loop, while it waits for a callback of ours."""
+        for subscription, callback in self._loop:
+            with subscription.handle:
+                while taken := subscription.handle.take_message(subscription.msg_type, False):
+                    callback(taken[0])
 
     def diagnose(self) -> tuple[bytes, str, Mapping[str, object]]:
         """ERROR in a fault and in a landing nobody asked for."""

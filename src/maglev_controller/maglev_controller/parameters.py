@@ -11,11 +11,28 @@ import math
 from maglev_node.parameters import group, parameter
 from maglev_plant.machine import MachineParameters
 
+LAWS = (
+    'internal_model',
+    'jacobian_lead_lag',
+    'feedback_lead_lag',
+    'feedback_soi',
+    'regulator_3dof',
+)
+"""Names of the control laws, each a file of :mod:`maglev_controller.laws`."""
+
 REFERENCE_FREQUENCY = 1.5 * math.pi
 """ω0 of the paper's sinusoids [rad/s]."""
 
-POLES_REAL = (-162.0, -134.0, -12.5, *(-2.8, -3.7, -4.0, -3.9, -3.1) * 2)
-POLES_IMAGINARY = (0.0, 0.0, 0.0, 3.9, 8.9, 13.4, 17.5, 22.0, -3.9, -8.9, -13.4, -17.5, -22.0)
+_UPPER_POLES = (
+    (-127.1, 77.51),
+    (-1.305, 23.13),
+    (-1.178, 18.47),
+    (-0.9852, 13.86),
+    (-0.7053, 9.272),
+    (-0.3645, 4.658),
+)
+POLES_REAL = (-148.6, *(real for real, _ in _UPPER_POLES for _ in range(2)))
+POLES_IMAGINARY = (0.0, *(sign * part for _, part in _UPPER_POLES for sign in (1.0, -1.0)))
 """Where the default LQR weights put the closed-loop poles, rounded [rad/s]."""
 
 
@@ -53,17 +70,17 @@ class AxisParameters:
         description='their imaginary parts, in the same order',
     )
     weight_error: float = parameter(
-        5e8, lower=0.0, upper=1e15, description='LQR weight on e^2 [1/m^2 or 1/rad^2]'
+        1.6e9, lower=0.0, upper=1e15, description='LQR weight on e^2 [1/m^2 or 1/rad^2]'
     )
     weight_rate: float = parameter(
-        4.5e4, lower=0.0, upper=1e15, description='LQR weight on the error rate squared'
+        8e4, lower=0.0, upper=1e15, description='LQR weight on the error rate squared'
     )
     weight_model: tuple[float, ...] = parameter(
-        (5e10,),
+        (1.3e13, 1.6e11),
         lower=0.0,
         upper=1e18,
-        description='LQR weight on each internal-model state: one for all, or one per frequency '
-        '(companion form: one per state)',
+        description='LQR weight on the internal-model states: one for all; or of the integrator '
+        'and of the oscillators; or one per frequency (companion form: per state)',
     )
     weight_effort: float = parameter(
         1.0, lower=1e-15, upper=1e15, description='LQR weight on w^2, R'
@@ -92,6 +109,22 @@ class InternalModelParameters:
         upper=1e3,
         description='frequency of the reference, omega_0',
     )
+    friction_slope: float = parameter(
+        1500.0,
+        unit='1/s',
+        lower=0.0,
+        upper=1e6,
+        description='steepest friction against velocity that standing still stays stable with: '
+        'phases the oscillators of LQR designs, and is checked; 0: not',
+    )
+    largest_error: tuple[float, ...] = parameter(
+        (1e-4, 1e-4, 1e-4, 2e-4, 2e-4),
+        unit='m, rad',
+        lower=1e-6,
+        upper=1.0,
+        length=5,
+        description='an internal model learns from errors up to this, per axis',
+    )
     restart_at_step: bool = parameter(
         False, description='begin every measured step as at enable, with internal models at rest'
     )
@@ -101,7 +134,47 @@ class InternalModelParameters:
         description="paper: (17) with the axes' E; observer: every axis follows what was realised",
     )
     antiwindup_speed: float = parameter(
-        10.0, unit='rad/s', lower=1e-3, upper=1e3, description='how fast it follows (observer)'
+        30.0, unit='rad/s', lower=1e-3, upper=1e3, description='how fast it follows (observer)'
+    )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class CompensatorParameters:
+    """Loop shape of the laws with a compensator from e to w in place of the internal model."""
+
+    crossover: tuple[float, ...] = parameter(
+        (300.0, 300.0, 300.0, 300.0, 300.0),
+        unit='rad/s',
+        lower=1.0,
+        upper=1e5,
+        length=5,
+        description='bandwidth: where the loop gain crosses 1, per axis',
+    )
+    phase_margin: float = parameter(
+        45.0,
+        unit='deg',
+        lower=5.0,
+        upper=85.0,
+        description='phase margin there, sampling included',
+    )
+    lag: float = parameter(
+        10.0,
+        lower=2.0,
+        upper=1000.0,
+        description='the integral acts below crossover / lag',
+    )
+    roll_off: float = parameter(
+        8.0,
+        lower=1.5,
+        upper=100.0,
+        description='the second-order roll-off acts above crossover * roll_off (feedback_soi)',
+    )
+    equilibrium: float = parameter(
+        0.025,
+        unit='m',
+        lower=1e-3,
+        upper=0.2,
+        description='air gap of the equilibrium that is linearised about (jacobian_lead_lag)',
     )
 
 
@@ -118,6 +191,40 @@ class DerivativeParameters:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
+class ObserverParameters:
+    """The Kalman filter that estimates position and rate, knowing the accelerations commanded."""
+
+    bandwidth: float = parameter(
+        800.0,
+        unit='rad/s',
+        lower=1.0,
+        upper=1e5,
+        description='where it turns from believing its prediction to believing the encoders',
+    )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class MarginParameters:
+    """What the sampled closed loop of every axis must have at least, or is refused."""
+
+    phase: float = parameter(
+        20.0, unit='deg', lower=0.0, upper=90.0, description='phase margin at least'
+    )
+    gain: float = parameter(
+        1.5,
+        lower=1.0,
+        upper=100.0,
+        description='gain margin at least, as a factor, up and down',
+    )
+    sensitivity: float = parameter(
+        3.5, lower=1.0, upper=1e3, description='sensitivity peak at most'
+    )
+    override: bool = parameter(
+        False, description='take a loop that is stable without these margins all the same'
+    )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class JumpParameters:
     """How a jump of the reference (a raw step, or the distance to it at enable) is made good."""
 
@@ -129,7 +236,7 @@ class JumpParameters:
         description='time in which the controller itself rounds off a jump; 0 = does not',
     )
     acceleration: tuple[float, ...] = parameter(
-        (4.0, 4.0, 4.0, 10.0, 10.0),
+        (5.5, 5.5, 5.5, 20.0, 20.0),
         unit='m/s^2, rad/s^2',
         lower=1e-3,
         upper=1e3,
@@ -148,6 +255,15 @@ class LimitParameters:
         lower=0.1,
         upper=50.0,
         description='largest phase-current amplitude of a motor; sat_7 of (17)',
+    )
+    error: tuple[float, ...] = parameter(
+        (5e-4, 5e-4, 5e-4, 1.5e-3, 1.5e-3),
+        unit='m, rad',
+        lower=1e-5,
+        upper=1.0,
+        length=5,
+        description='error that is fed back at most, per axis; a larger one is approached at a '
+        'speed that the currents can brake',
     )
     levitation_first: bool = parameter(
         True, description='i_q yields to the i_d that carries the platen (exact inverse only)'
@@ -206,19 +322,39 @@ class ControllerParameters:
     sample_time: float = parameter(
         1e-3, unit='s', lower=1e-5, upper=0.1, description='sample time', read_only=True
     )
+    law: str = parameter(
+        'internal_model',
+        choices=LAWS,
+        description='control law: how e becomes w; maglev_controller.laws tells what each is',
+    )
     inverse: str = parameter(
         'exact',
-        choices=('exact', 'simplified'),
-        description="simplified: the paper's (8), (12); exact: per motor through the quadratic (2)",
+        choices=('exact', 'simplified', 'equilibrium'),
+        description="simplified: the paper's (8), (12); exact: per motor through the quadratic (2);"
+        ' equilibrium: constant gains, by linearisation (jacobian_lead_lag)',
     )
     feed_forward: bool = parameter(True, description='add the acceleration of the reference to w')
     internal_model: InternalModelParameters = group(InternalModelParameters)
+    compensator: CompensatorParameters = group(CompensatorParameters)
+    rate_estimate: str = parameter(
+        'observer',
+        choices=('observer', 'derivative'),
+        description='where rates come from: the observer, or the derivative filter',
+    )
+    input_delay: int = parameter(
+        0,
+        lower=0,
+        upper=1,
+        description='samples by which the currents come late; design and margins count with them',
+    )
+    observer: ObserverParameters = group(ObserverParameters)
     derivative: DerivativeParameters = group(DerivativeParameters)
     y: AxisParameters = group(AxisParameters)
     x: AxisParameters = group(AxisParameters)
     z: AxisParameters = group(AxisParameters)
     phi: AxisParameters = group(AxisParameters)
     theta: AxisParameters = group(AxisParameters)
+    margins: MarginParameters = group(MarginParameters)
     jumps: JumpParameters = group(JumpParameters)
     limits: LimitParameters = group(LimitParameters)
     measurement: MeasurementParameters = group(MeasurementParameters)

@@ -1,23 +1,34 @@
 """The regulator: encoder readings and a reference in, motor currents out, once a sample.
 
 w = K (e, ė, ξ) + Γ ξ on every axis (16), the internal model (14) or (17) sampled exactly, then one
-of the inverses. ė is the filtered position's rate less the reference's velocity through the same
+of the inverses. e and ė are an observer's position and rate less the reference's; with the paper's
+derivative filter, ė is the filtered position's rate less the reference's velocity through the same
 filter: the filtered rate of e, but for a jump of the set-point, which has no rate and so gives no
 kick. With feed-forward, w also holds the reference's acceleration.
 """
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from maglev_controller import law
-from maglev_controller.design import AxisDesign, design_axis
+from maglev_controller.design import AxisDesign
 from maglev_controller.law import ControlArrays, control_step
+from maglev_controller.laws import control_law
+from maglev_controller.margins import LoopMargins, all_margins, check_margins
+from maglev_controller.observer import NO_OBSERVER
 from maglev_controller.parameters import ControllerParameters
+from maglev_controller.retuning import ModelMaps, carry_over, check_retuning, model_maps
 from maglev_plant.machine import AXES, machine_constants, machine_to_array
 
 FloatArray = NDArray[np.float64]
+
+FADING_TIME = 0.05
+"""Time constant of the share of w that bridges a change of gains in flight [s]."""
 
 
 class MeasurementFault(ValueError):  # noqa: N818
@@ -34,23 +45,68 @@ class Regulator:
     def __init__(self, parameters: ControllerParameters) -> None:
         """Design all axes. Raises ``ParameterError`` with the reason for what cannot be had."""
         self.parameters = parameters
-        self.designs: tuple[AxisDesign, ...] = tuple(design_axis(parameters, name) for name in AXES)
-        self._arrays = _control_arrays(parameters, self.designs)
-        telemetry = self._arrays.telemetry
+        chosen = control_law(parameters)
+        self.designs: tuple[AxisDesign, ...] = tuple(
+            chosen.design(parameters, name) for name in AXES
+        )
+        self.margins: tuple[LoopMargins, ...] = all_margins(parameters, self.designs)
+        for name, found, own in zip(AXES, self.margins, parameters.axes, strict=True):
+            if own.controlled:
+                check_margins(parameters, found, name)
+        self._use(_control_arrays(parameters, self.designs))
+        self.reset()
+
+    def _use(self, arrays: ControlArrays) -> None:
+        self._arrays = arrays
+        telemetry = arrays.telemetry
         self.position = telemetry[law.POSITION]
         self.error = telemetry[law.ERROR]
         self.error_rate = telemetry[law.ERROR_RATE]
         self.virtual_input = telemetry[law.VIRTUAL_INPUT]
         self.internal_model = telemetry[law.INTERNAL_MODEL]
-        self.reset()
+
+    def __getstate__(self) -> tuple[Any, ...]:
+        """What goes to another process; the readable arrays are views and made again there."""
+        return self.parameters, self.designs, self.margins, self._arrays
+
+    def __setstate__(self, state: tuple[Any, ...]) -> None:
+        """Come back from another process."""
+        self.parameters, self.designs, self.margins, arrays = state
+        self._use(arrays)
 
     @property
     def arrays(self) -> ControlArrays:
         """The regulator's own arrays, for compiled loops that call ``law.control_step``."""
         return self._arrays
 
+    def describe_loops(self) -> list[str]:
+        """Margins and poles of the sampled closed loop, one line for each axis under control."""
+        axes = zip(AXES, self.margins, self.parameters.axes, strict=True)
+        return [found.text(name) for name, found, own in axes if own.controlled]
+
+    def retuned(self, parameters: ControllerParameters) -> Regulator:
+        """A regulator with other parameters that goes on in flight where this one is.
+
+        This one stays as it is, to be replaced between two steps. Raises ``ParameterError`` for
+        what cannot be had, and for what cannot change in flight.
+        """
+        check_retuning(self.parameters, parameters)
+        successor = Regulator(parameters)
+        successor.take_over(self)
+        return successor
+
+    def take_over(self, previous: Regulator, maps: ModelMaps | None = None) -> None:
+        """Go on where ``previous`` is, without a jump of w; both designed for the same stage.
+
+        With ``maps``, which :func:`maglev_controller.retuning.model_maps` makes of the two, it is
+        done within a fraction of a sample.
+        """
+        if maps is None:
+            maps = model_maps(previous.arrays, self._arrays)
+        carry_over(previous.arrays, self._arrays, maps)
+
     def reset(self) -> None:
-        """Internal models at rest, derivative filters to start anew: do at every enable."""
+        """Internal models at rest, observers and filters to start anew: do at every enable."""
         self._arrays.state[:] = 0.0
         self._arrays.state[:, law.FRESH] = 1.0
         self._arrays.telemetry[:] = 0.0
@@ -148,7 +204,8 @@ def _settings_array(parameters: ControllerParameters, design: AxisDesign) -> Flo
     settings = np.zeros(law.SETTINGS)
     settings[law.FILTER_GAIN], settings[law.FILTER_FORGET] = design.derivative
     settings[law.FEED_FORWARD] = parameters.feed_forward
-    settings[law.EXACT] = parameters.inverse == 'exact'
+    settings[law.INVERSE] = law.INVERSES.index(parameters.inverse)
+    settings[law.EQUILIBRIUM] = parameters.compensator.equilibrium
     settings[law.PAPER_ANTIWINDUP] = parameters.internal_model.antiwindup == 'paper'
     settings[law.CURRENT] = limits.current
     settings[law.LEVITATION_FIRST] = limits.levitation_first
@@ -163,5 +220,14 @@ def _settings_array(parameters: ControllerParameters, design: AxisDesign) -> Flo
         parameters.sample_time,
         parameters.jumps.duration,
     )
-    settings[law.JUMP_ACCELERATION : law.SETTINGS] = parameters.jumps.acceleration
+    settings[law.JUMP_ACCELERATION : law.JUMP_ACCELERATION + 5] = parameters.jumps.acceleration
+    settings[law.LARGEST_ERROR : law.SETTINGS] = math.inf
+    if design.model.form != 'compensator':
+        learned = parameters.internal_model.largest_error
+        settings[law.LARGEST_ERROR : law.LARGEST_ERROR + 5] = learned
+        settings[law.ERROR_LIMIT : law.ERROR_LIMIT + 5] = limits.error
+    settings[law.OBSERVER] = design.observer != NO_OBSERVER
+    settings[law.OBSERVER_POSITION], settings[law.OBSERVER_VELOCITY] = design.observer
+    settings[law.AHEAD] = parameters.input_delay
+    settings[law.FADE] = math.exp(-parameters.sample_time / FADING_TIME)
     return settings

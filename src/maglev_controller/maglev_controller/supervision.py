@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 
 from maglev_controller.landing import Landing
 from maglev_controller.parameters import ControllerParameters
+from maglev_controller.redesign import Redesign
 from maglev_controller.reference_buffer import ReferenceBuffer
 from maglev_controller.regulator import MeasurementFault, Regulator
+from maglev_controller.retuning import ModelMaps, check_retuning
 
 FloatArray = NDArray[np.float64]
 
@@ -75,11 +77,21 @@ class Supervisor:
         """Whether currents flow."""
         return self.mode in (Mode.REGULATING, Mode.LANDING)
 
-    def retune(self, parameters: ControllerParameters) -> None:
-        """Take new parameters, on the ground only. Raises ParameterError when they are no good."""
-        self.regulator = Regulator(parameters)
-        self.parameters = parameters
-        self._lower_stop = parameters.machine.gap_max
+    def redesign(self, parameters: ControllerParameters) -> Redesign:
+        """Begin to design a regulator for new parameters, to :meth:`adopt` between two steps.
+
+        Raises ParameterError for what cannot change in flight.
+        """
+        if self.flying:
+            check_retuning(self.parameters, parameters)
+        return Redesign(self.regulator, parameters)
+
+    def adopt(self, regulator: Regulator, maps: ModelMaps) -> None:
+        """Go on with another regulator, in flight without a jump of its output."""
+        if self.flying:
+            regulator.take_over(self.regulator, maps)
+        self.regulator, self.parameters = regulator, regulator.parameters
+        self._lower_stop = regulator.parameters.machine.gap_max
 
     def enable(self) -> tuple[bool, str]:
         """Follow the reference from its next lift-off on; refused while a fault is latched."""

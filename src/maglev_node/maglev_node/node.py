@@ -56,8 +56,21 @@ class NodeParameters:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class SourceParameters(NodeParameters):
-    """What every node takes that publishes samples."""
+    """What every node of the loop takes: stage, controller and reference."""
 
+    mode: str = parameter(
+        'lockstep',
+        choices=('lockstep', 'realtime'),
+        description='lockstep: each sample waits for its answer; realtime: by the clock',
+        read_only=True,
+    )
+    realtime_priority: int = parameter(
+        40,
+        lower=0,
+        upper=98,
+        description='realtime: SCHED_FIFO priority of the process, where permitted; 0: none',
+        read_only=True,
+    )
     watchers: int = parameter(
         0,
         lower=0,
@@ -105,16 +118,20 @@ class MaglevNode(Node, Generic[P]):
     def close(self) -> None:
         """What must happen last; publishers still work. Must be quick and must not raise."""
 
-    def take_realtime_priority(self, priority: int) -> None:
-        """Put all threads of this process under SCHED_FIFO; 0 leaves them as they are.
+    def take_realtime_priority(self) -> None:
+        """In real time, put all threads of this process under SCHED_FIFO, where permitted.
 
-        Call it when publishers and subscriptions exist, so that the middleware's threads do too.
+        For nodes with :class:`SourceParameters`, when their publishers and subscriptions exist, so
+        that the middleware's threads do too.
         """
-        if priority == 0:
+        parameters: Any = self.parameters
+        if parameters.mode != 'realtime' or parameters.realtime_priority == 0:
             return
         try:
             for thread in os.listdir('/proc/self/task'):
-                os.sched_setscheduler(int(thread), os.SCHED_FIFO, os.sched_param(priority))
+                scheduling = os.sched_param(parameters.realtime_priority)
+                policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
+                os.sched_setscheduler(int(thread), policy, scheduling)
         except OSError:
             self.get_logger().warning(
                 'real-time priority is not permitted (see ulimit -r): samples may come late'

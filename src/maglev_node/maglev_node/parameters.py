@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import functools
 import math
 import re
 import typing
@@ -139,9 +140,14 @@ def group(cls: type[T]) -> T:
     return dataclasses.field(default_factory=cls)
 
 
+@functools.cache
+def _hints(cls: Any) -> dict[str, Any]:
+    return typing.get_type_hints(cls)
+
+
 def specs(cls: type, prefix: str = '') -> dict[str, Spec]:
     """All parameters of a table, by full name, in the order they are written."""
-    hints = typing.get_type_hints(cls)
+    hints = _hints(cls)
     found: dict[str, Spec] = {}
     for field in dataclasses.fields(cls):
         name = prefix + field.name
@@ -208,7 +214,7 @@ def unknown_parameter(name: str, known: Iterable[str]) -> ParameterError:
 
 
 def _assemble(cls: type[T], checked: Mapping[str, object], prefix: str) -> T:
-    hints = typing.get_type_hints(cls)
+    hints = _hints(typing.cast(Any, cls))
     keywords: dict[str, Any] = {}
     for field in dataclasses.fields(typing.cast(Any, cls)):
         name = prefix + field.name

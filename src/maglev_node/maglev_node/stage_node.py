@@ -12,25 +12,21 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import Trigger
 
 from maglev_msgs.msg import Currents, Measurement
-from maglev_node.node import MaglevNode, NodeError, SourceParameters
+from maglev_node.managed_node import ManagedNode, ManagedParameters
+from maglev_node.node import NodeError
 from maglev_node.parameters import ParameterError, parameter
-from maglev_node.stage import Stage, StageError
+from maglev_node.stage import EncoderSample, Stage, StageError
 from maglev_node.stamp import stamp_now
 from maglev_node.topics import CURRENTS, MEASUREMENT, sample_qos
 
 _REPEAT_PERIOD = 0.02
+_TIMEOUTS = ('answer_timeout', 'watchdog', 'overrun_limit')
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class StageNodeParameters(SourceParameters):
+class StageNodeParameters(ManagedParameters):
     """What every stage's node takes."""
 
-    mode: str = parameter(
-        'lockstep',
-        choices=('lockstep', 'realtime'),
-        description='lockstep: each sample waits for its currents; realtime: 1 kHz by the clock',
-        read_only=True,
-    )
     answer_timeout: float = parameter(
         5.0,
         unit='s',
@@ -38,19 +34,25 @@ class StageNodeParameters(SourceParameters):
         upper=600.0,
         description='lockstep: longest wait for the currents of a sample, wall clock',
     )
+    first_sequence: int = parameter(
+        0,
+        lower=0,
+        upper=2**62,
+        description='number of the first sample, to go on where another stage has ended',
+        read_only=True,
+    )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class ClockedStageParameters(StageNodeParameters):
+    """What the node of a stage takes that has no clock of its own."""
+
     watchdog: float = parameter(
         0.02,
         unit='s',
         lower=0.002,
         upper=1.0,
         description='realtime: without fresh currents for this long they are cut',
-    )
-    realtime_priority: int = parameter(
-        40,
-        lower=0,
-        upper=98,
-        description='realtime: SCHED_FIFO priority of the process, where permitted; 0: none',
-        read_only=True,
     )
     overrun_limit: float = parameter(
         0.5,
@@ -61,12 +63,13 @@ class StageNodeParameters(SourceParameters):
     )
 
 
-class StageNode(MaglevNode[Any]):
+class StageNode(ManagedNode[Any]):
     """Publishes the encoders of a :class:`Stage` and writes the currents that answer them.
 
-    Lockstep: sample 0 is repeated until a controller answers it; from then on each sample waits
-    for the currents with its sequence number. Real time: a sample every ``sample_time``, with the
-    newest currents, hence one sample of delay. A fault is latched: no current until ``~/reset``.
+    Lockstep: the first sample is repeated until a controller answers it; from then on each sample
+    waits for the currents with its sequence number. Real time: a sample every ``sample_time``, with
+    the newest currents, hence one sample of delay. A fault is latched: no current until
+    ``~/reset``. Configured, it holds its stage and its place on the graph; active, it samples.
     """
 
     def __init__(
@@ -77,11 +80,8 @@ class StageNode(MaglevNode[Any]):
     ) -> None:
         super().__init__(name, parameter_table)
         self.sample_time = float(self.parameters.sample_time)
-        try:
-            self.stage = make_stage(self.parameters)
-        except StageError as error:
-            raise NodeError(str(error)) from error
-        self.claim(MEASUREMENT, 'stage')
+        self._make_stage = make_stage
+        self.stage: Any = None
         self.fault: str | None = None
         self.late_samples = 0
         self._answered = False
@@ -91,34 +91,89 @@ class StageNode(MaglevNode[Any]):
         self._currents_sequence = -1
         self.measurement = Measurement()
         self.measurement.header.frame_id = 'stage'
-        self._publisher = self.create_publisher(Measurement, MEASUREMENT, sample_qos())
-        self.sequence = 0
-        self._sample_wall_time = time.monotonic()
-        self._sample = self.stage.read()
+        self.sequence = -1
+        self._sample_wall_time = self._first_tick = time.monotonic()
+        self._first_sequence = 0  # of this activation
+        self._sample: EncoderSample | None = None
+        self._publisher: Any = None
+        self._subscription: Any = None
+        self._timer: Any = None
+        self._lockstep = self.parameters.mode == 'lockstep'
         for service, action in (
             ('~/emergency_stop', self._emergency_stop),
             ('~/reset', self._reset),
         ):
             self.create_service(Trigger, service, action)
-        self._lockstep = self.parameters.mode == 'lockstep'
-        if self._lockstep:
-            self._subscription = self.create_subscription(
-                Currents, CURRENTS, self._on_answer, sample_qos()
-            )
-            self.create_timer(_REPEAT_PERIOD, self._watch_lockstep, clock=self.steady_clock)
-        else:
-            self._subscription = self.create_subscription(
-                Currents, CURRENTS, self._on_currents, sample_qos()
-            )
-            self._first_tick = time.monotonic()
-            self.create_timer(self.sample_time, self._on_tick, clock=self.steady_clock)
-            self.take_realtime_priority(self.parameters.realtime_priority)
+
+    # -- life cycle --------------------------------------------------------------------------------
+
+    def configure(self) -> None:
+        """Open the stage and take its place on the graph."""
+        self.stage = self._make_stage(self.parameters)
+        try:
+            self.claim(MEASUREMENT, 'stage')
+        except NodeError:
+            self._release_stage()
+            raise
+        self.sequence = self.parameters.first_sequence - 1
+        self._publisher = self.create_publisher(Measurement, MEASUREMENT, sample_qos())
+        on_message = self._on_answer if self._lockstep else self._on_currents
+        self._subscription = self.create_subscription(Currents, CURRENTS, on_message, sample_qos())
+
+    def activate(self) -> None:
+        """Take the first sample and begin to sample."""
         self.get_logger().info(f'{self.parameters.mode}, waiting for a controller on {CURRENTS}')
+        period, action = _REPEAT_PERIOD, self._watch_lockstep
+        if not self._lockstep:
+            period, action = self.tick_period, self._on_tick
+            self.take_realtime_priority()
+        self.start_stage()
+        self._answered = False
+        self._currents_sequence = -1
+        self._sample = self.stage.read()
+        self.sequence += 1
+        self._first_sequence = self.sequence
+        self._sample_wall_time = self._first_tick = time.monotonic()
+        self._timer = self.create_timer(period, action, clock=self.steady_clock)
+
+    def deactivate(self) -> None:
+        """End sampling, with no current flowing."""
+        self.destroy_timer(self._timer)
+        self._timer = None
+        self.stop_stage()
+
+    def cleanup(self) -> None:
+        """Release the stage and leave the graph."""
+        if self._timer is not None:
+            self.destroy_timer(self._timer)
+        self._release_stage()
+        self.destroy_publisher(self._publisher)
+        self.destroy_subscription(self._subscription)
+        self._publisher = self._subscription = self._timer = None
+
+    def _release_stage(self) -> None:
+        stage, self.stage = self.stage, None
+        if stage is not None:
+            stage.close()
+
+    def start_stage(self) -> None:
+        """What a stage needs before its first sample."""
+
+    def stop_stage(self) -> None:
+        """What a stage needs after its last sample; no current flows afterwards."""
+        self.stage.write(self._zero, self._zero)
+
+    @property
+    def tick_period(self) -> float:
+        """Real time: how long after one tick the next is attended to [s]."""
+        return self.sample_time
 
     # -- lockstep ----------------------------------------------------------------------------------
 
     def _on_answer(self, message: Currents) -> None:
-        if message.sequence != self.sequence or not (self._answered or self.watched()):
+        if message.sequence != self.sequence or self._timer is None:
+            return
+        if not (self._answered or self.watched()):
             return
         self._answered = True
         self._apply(message.direct_current, message.quadrature_current)
@@ -134,7 +189,11 @@ class StageNode(MaglevNode[Any]):
                 if self._subscription.get_publisher_count()
                 else f'no controller publishes {CURRENTS} any more'
             )
-            self.fail(f'no currents for sample {self.sequence} within {waited:.1f} s: {who}')
+            self.unanswered(f'no currents for sample {self.sequence} within {waited:.1f} s: {who}')
+
+    def unanswered(self, message: str) -> None:
+        """Lockstep: no answer came in time; ``message`` says whose it was."""
+        self.fail(message)
 
     # -- real time ---------------------------------------------------------------------------------
 
@@ -142,10 +201,11 @@ class StageNode(MaglevNode[Any]):
         self._currents_sequence = message.sequence
         self._direct = message.direct_current
         self._quadrature = message.quadrature_current
-        self._answered = True
+        # A controller that catches up with what it missed at its start is not late, only not there.
+        self._answered |= message.sequence == self.sequence
 
     def _on_tick(self) -> None:
-        due = int((time.monotonic() - self._first_tick) / self.sample_time)
+        due = self._first_sequence + int((time.monotonic() - self._first_tick) / self.sample_time)
         behind = (due - self.sequence) * self.sample_time
         if behind > self.parameters.overrun_limit:
             self.fail(
@@ -172,13 +232,18 @@ class StageNode(MaglevNode[Any]):
         try:
             self._sample = self.stage.read()
         except StageError as error:
-            self.fail(str(error))
+            self.lost(error)
             return
         self.sequence += 1
         self._sample_wall_time = time.monotonic()
         self._publish()
 
+    def lost(self, error: StageError) -> None:
+        """The stage gives no samples any more."""
+        self.fail(str(error))
+
     def _publish(self) -> None:
+        assert self._sample is not None
         message = self.measurement
         stamp_now(message.header.stamp)
         message.sequence = self.sequence
@@ -225,9 +290,7 @@ class StageNode(MaglevNode[Any]):
     def on_parameters(self, parameters: Any) -> None:
         """Only the time-outs change while running."""
         changeable = {
-            'answer_timeout': parameters.answer_timeout,
-            'watchdog': parameters.watchdog,
-            'overrun_limit': parameters.overrun_limit,
+            name: getattr(parameters, name) for name in _TIMEOUTS if hasattr(parameters, name)
         }
         if parameters != dataclasses.replace(self.parameters, **changeable):
             raise ParameterError(
@@ -241,6 +304,8 @@ class StageNode(MaglevNode[Any]):
             'sequence': self.sequence,
             'late_samples': self.late_samples,
         }
+        if self.state != 'active':
+            return DiagnosticStatus.OK, self.state, facts
         if self.fault is not None:
             return DiagnosticStatus.ERROR, f'currents cut: {self.fault}', facts
         if not self._answered:
@@ -251,4 +316,4 @@ class StageNode(MaglevNode[Any]):
 
     def close(self) -> None:
         """No current flows, and the stage is released."""
-        self.stage.close()
+        self._release_stage()

@@ -63,6 +63,12 @@ class MachineParameters:
     recoil_permeability: float = parameter(
         1.05, lower=1.0, upper=2.0, description='relative recoil permeability mu_rec of the magnets'
     )
+    motors: int = parameter(
+        4,
+        lower=1,
+        upper=4,
+        description='4, or 1: motor 2 alone, the machine of refs. [10], [11], moving in y and x',
+    )
     mass_x: float = parameter(
         10.6, unit='kg', lower=0.1, upper=1000.0, description='moving mass M_x along X'
     )
@@ -116,6 +122,8 @@ class MachineParameters:
 
     def __post_init__(self) -> None:
         """Refuse what each value alone cannot show to be wrong."""
+        if self.motors not in (1, 4):
+            raise ParameterError(f"parameter 'motors' is {self.motors}, it must be 1 or 4")
         for small, large in (
             ('gap_min', 'gap_max'),
             ('slot_width', 'slot_pitch'),
@@ -165,6 +173,7 @@ class Machine(NamedTuple):
     k_s_phi: float
     k_s_theta: float
     G: float
+    motors: float  # 4, or 1 for motor 2 alone
 
 
 def machine_constants(parameters: MachineParameters) -> Machine:
@@ -215,11 +224,12 @@ def machine_constants(parameters: MachineParameters) -> Machine:
         k_s_phi=p.spring_phi,
         k_s_theta=p.spring_theta,
         G=p.gravity,
+        motors=float(p.motors),
     )
 
 
 def machine_to_array(machine: Machine) -> NDArray[np.float64]:
-    """The constants in one array, shape (24,), for :func:`machine_from_array`."""
+    """The constants in one array, shape (25,), for :func:`machine_from_array`."""
     return np.array(machine, dtype=np.float64)
 
 
@@ -251,4 +261,5 @@ def machine_from_array(m: NDArray[np.float64]) -> Machine:
         m[21],
         m[22],
         m[23],
+        m[24],
     )

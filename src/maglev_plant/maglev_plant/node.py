@@ -6,7 +6,7 @@ import dataclasses
 
 from maglev_msgs.msg import PlantState
 from maglev_node.node import main as run_main
-from maglev_node.stage_node import StageNode, StageNodeParameters
+from maglev_node.stage_node import ClockedStageParameters, StageNode
 from maglev_node.stamp import copy_stamp
 from maglev_node.topics import TRUE_STATE, sample_qos
 from maglev_plant.parameters import PlantParameters
@@ -14,7 +14,7 @@ from maglev_plant.simulation import SimulatedStage
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class PlantNodeParameters(StageNodeParameters, PlantParameters):
+class PlantNodeParameters(ClockedStageParameters, PlantParameters):
     """The plant and how its node runs it."""
 
 

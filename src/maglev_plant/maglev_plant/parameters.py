@@ -244,6 +244,11 @@ class PlantParameters:
         """Refuse a start outside the stops and steps too long for the friction."""
         self._check_initial()
         self._check_substeps()
+        if self.machine.motors == 1 and not all(self.guide.locked[2:]):
+            raise ParameterError(
+                "parameter 'guide.locked' leaves z, phi or theta free, which a machine with a "
+                'single motor cannot carry: lock all three'
+            )
 
     def _check_initial(self) -> None:
         position = self.initial.position

@@ -71,10 +71,14 @@ def output_accelerations(
 ) -> tuple[float, float, float, float, float]:
     """Accelerations of y, x, z, phi, theta [m/s², rad/s²] by (6), (7), from what they depend on.
 
-    ``y`` [m], ``phi``, ``theta`` [rad]; ``i_d``, ``i_q`` [A], shape (4,).
+    ``y`` [m], ``phi``, ``theta`` [rad]; ``i_d``, ``i_q`` [A], shape (4,). Of a machine with a
+    single motor, only y and x move.
     """
     tilt_phi = machine.r * math.sin(phi)
     tilt_theta = machine.r * math.sin(theta)
+    if machine.motors == 1.0:
+        v_2, h_2 = _motor_forces(machine, y, i_d[1], i_q[1])
+        return machine.G + v_2 / machine.M_y, h_2 / machine.M_x, 0.0, 0.0, 0.0
     v_1, h_1 = _motor_forces(machine, y - tilt_phi, i_d[0], i_q[0])
     v_2, h_2 = _motor_forces(machine, y + tilt_theta, i_d[1], i_q[1])
     v_3, h_3 = _motor_forces(machine, y + tilt_phi, i_d[2], i_q[2])

@@ -1,0 +1,3 @@
+"""All control laws over the same experiments on the same stage: a table and their regions of
+operation.
+"""

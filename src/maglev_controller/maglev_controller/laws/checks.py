@@ -1,0 +1,59 @@
+"""What more than one law refuses."""
+
+from __future__ import annotations
+
+from maglev_controller.parameters import ControllerParameters
+from maglev_node.parameters import ParameterError
+
+
+def check_machine(parameters: ControllerParameters) -> None:
+    """Refuse control of what the machine with a single motor cannot move."""
+    if parameters.machine.motors == 4:
+        return
+    names = ('z', 'phi', 'theta')
+    moved = [name for name in names if getattr(parameters, name).controlled]
+    if moved:
+        raise ParameterError(
+            f"parameter '{moved[0]}.controlled' is true, but a machine with a single motor moves "
+            'in y and x only'
+        )
+    if parameters.inverse != 'exact':
+        raise ParameterError(
+            f"parameter 'inverse' is '{parameters.inverse}', a machine with a single motor has "
+            "'exact' only"
+        )
+
+
+def check_inverse(parameters: ControllerParameters, *, linear: bool) -> None:
+    """A law that linearises by feedback takes a nonlinear inverse, one by Jacobian the other."""
+    law, inverse = parameters.law, parameters.inverse
+    if linear and inverse != 'equilibrium':
+        raise ParameterError(
+            f"parameter 'inverse' is '{inverse}', but the law '{law}' is designed for the plant "
+            "linearised about an equilibrium: it takes 'equilibrium'"
+        )
+    if not linear and inverse == 'equilibrium':
+        raise ParameterError(
+            f"parameter 'inverse' is 'equilibrium', but the law '{law}' is designed for double "
+            "integrators, which only feedback linearisation makes: it takes 'exact' or 'simplified'"
+        )
+
+
+def check_compensator(parameters: ControllerParameters) -> None:
+    """Refuse what belongs to the internal model and means nothing to a compensator."""
+    if parameters.internal_model.antiwindup == 'paper':
+        raise ParameterError(
+            "parameter 'internal_model.antiwindup' is 'paper', equation (17), which is about "
+            f"internal models; the law '{parameters.law}' has none: it takes 'observer' or 'none'"
+        )
+    if parameters.rate_estimate == 'observer':
+        raise ParameterError(
+            f"parameter 'rate_estimate' is 'observer', but the law '{parameters.law}' feeds back "
+            "no rate: it takes 'derivative', which it leaves unused"
+        )
+    if parameters.internal_model.restart_at_step:
+        raise ParameterError(
+            "parameter 'internal_model.restart_at_step' is true: the law "
+            f"'{parameters.law}' has no internal model, and its integrator carries the weight's "
+            'remainder, which must not be lost in flight'
+        )

@@ -1,0 +1,129 @@
+"""A node with a life cycle (REP-2002's managed node) that can also bring itself up."""
+
+from __future__ import annotations
+
+import dataclasses
+import gc
+from collections.abc import Callable
+from typing import TypeVar
+
+from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
+
+from maglev_node.node import MaglevNode, NodeError, SourceParameters
+from maglev_node.parameters import ParameterError, parameter
+from maglev_node.stage import StageError
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class ManagedParameters(SourceParameters):
+    """What every managed node takes."""
+
+    autostart: bool = parameter(
+        True,
+        description='configure and activate by itself; false: by the life-cycle services',
+        read_only=True,
+    )
+
+
+P = TypeVar('P', bound=ManagedParameters)
+
+_REFUSALS = (NodeError, StageError, ParameterError)
+
+
+class ManagedNode(LifecycleNodeMixin, MaglevNode[P]):
+    """A node that is configured, activated, deactivated and cleaned up, by services or by itself.
+
+    A subclass does the work in :meth:`configure`, :meth:`activate`, :meth:`deactivate` and
+    :meth:`cleanup`; NodeError, StageError or ParameterError raised there refuses the transition.
+    """
+
+    def __init__(self, name: str, parameter_table: type[P]) -> None:
+        MaglevNode.__init__(self, name, parameter_table)
+        LifecycleNodeMixin.__init__(self)
+        self._bringing_up = False
+        self._refusal: Exception | None = None
+
+    def configure(self) -> None:
+        """Get hold of everything that is needed."""
+
+    def activate(self) -> None:
+        """Begin to work."""
+
+    def deactivate(self) -> None:
+        """End working, in a state that is safe."""
+
+    def cleanup(self) -> None:
+        """Release everything."""
+
+    @property
+    def state(self) -> str:
+        """The life-cycle state: unconfigured, inactive, active or finalized."""
+        return str(self._state_machine.current_state[1])
+
+    def spin(self, stop: Callable[[], bool]) -> None:
+        """Bring itself up where that is wanted, then serve the graph."""
+        if self.parameters.autostart:
+            self._bringing_up = True
+            self._demand(self.trigger_configure())
+            gc.collect()
+            gc.freeze()
+            self._start = self.create_timer(1e-3, self._autostart, clock=self.steady_clock)
+        super().spin(stop)
+
+    def _autostart(self) -> None:
+        """Activate when the graph is served, so that nothing comes between that and work."""
+        self._start.cancel()
+        if not self._bringing_up:  # the executor had the timer's next event already
+            return
+        result = self.trigger_activate()
+        self._bringing_up = False
+        if result != TransitionCallbackReturn.SUCCESS:
+            self.fail(str(self._refusal))
+
+    def _demand(self, result: TransitionCallbackReturn) -> None:
+        if result != TransitionCallbackReturn.SUCCESS:
+            assert self._refusal is not None
+            raise self._refusal
+
+    def _transit(self, name: str, *actions: Callable[[], None]) -> TransitionCallbackReturn:
+        try:
+            for action in actions:
+                action()
+        except _REFUSALS as error:
+            user_error = not isinstance(error, StageError)
+            self._refusal = error if user_error else NodeError(str(error))
+            if not self._bringing_up:
+                self.get_logger().error(f'{name} refused: {error}')
+            return TransitionCallbackReturn.FAILURE
+        except Exception as error:
+            self._refusal = error
+            self.get_logger().fatal(f'{name} failed: {error!r}')
+            return TransitionCallbackReturn.ERROR
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_configure(self, _state: LifecycleState) -> TransitionCallbackReturn:
+        """From unconfigured to inactive."""
+        return self._transit('configure', self.configure)
+
+    def on_activate(self, _state: LifecycleState) -> TransitionCallbackReturn:
+        """From inactive to active."""
+        return self._transit('activate', self.activate)
+
+    def on_deactivate(self, _state: LifecycleState) -> TransitionCallbackReturn:
+        """From active to inactive."""
+        return self._transit('deactivate', self.deactivate)
+
+    def on_cleanup(self, _state: LifecycleState) -> TransitionCallbackReturn:
+        """From inactive to unconfigured."""
+        return self._transit('cleanup', self.cleanup)
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """From any state to the end of the process."""
+        actions = {'active': (self.deactivate, self.cleanup), 'inactive': (self.cleanup,)}
+        result = self._transit('shutdown', *actions.get(state.label, ()))
+        self.finish(0 if result == TransitionCallbackReturn.SUCCESS else 1)
+        return result
+
+    def on_error(self, _state: LifecycleState) -> TransitionCallbackReturn:
+        """After a defect: release everything and be unconfigured."""
+        return self._transit('clean-up after an error', self.cleanup)
