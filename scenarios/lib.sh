@@ -181,7 +181,8 @@ node_arguments() { # NODE
   case $1 in
     stage | controller) arguments+=(-p "mode:=$mode" -p watchers:=2) ;;
     reference)
-      arguments+=(-p autostart:=true -p exit_at_end:=false -p watchers:=2)
+      arguments+=(-p "mode:=$mode" -p watchers:=2 -p autostart:=true -p exit_at_end:=false)
+      [[ $mode != realtime ]] || arguments+=(-p lead:=128) # for when the machine holds it up
       arguments+=("${reference_arguments[@]}")
       [[ -z $duration ]] || arguments+=(-p "duration:=$duration")
       ;;

@@ -29,6 +29,11 @@ find_keys() {
   sums=$(sha256sum setup/*.bash src/*/{package.xml,CMakeLists.txt,setup.{py,cfg}} \
     src/*/{msg,srv}/* | sha256sum)
   build_key="$environment_key ${sums%% *}"
+  # Numba sees a change of a function's own file only, not of what it calls: another cache for each
+  # state of the sources, or a run would silently use old code.
+  sums=$(find src -regex 'src/maglev_\(plant\|controller\|hw_bridge\)/.*\.py' \
+    ! -name node.py -print0 | sort -z | xargs -0r sha256sum | sha256sum)
+  sources=${sums:0:16}
   sums=$(sha256sum setup/requirements-test.txt)
   test_key="$environment_key ${sums%% *}"
   shopt -u nullglob
@@ -47,7 +52,9 @@ environment_done() { [[ -x $venv/bin/python ]] && stamped "$venv/.stamp" "$envir
 build_done() {
   stamped "$root/build/.stamp" "$build_key" && stamped "$root/install/.stamp" "$build_key"
 }
-compiled() { stamped "$cache/numba/.stamp" "$build_key"; }
+compiled() {
+  stamped "$cache/numba/current" "$sources" && stamped "$cache/numba/$sources/.stamp" "$build_key"
+}
 test_done() { stamped "$cache/test-tools/.stamp" "$test_key"; }
 
 everything_done() {
@@ -98,11 +105,17 @@ make_build() {
 }
 
 compile() {
+  local old
+  mkdir -p -- "$cache/numba/$sources"
+  stamp "$cache/numba/current" "$sources"
   step 'compiling the control loop for this processor' warm_up
   ! grep -q '^not compiled$' "$log" ||
     say "not compiled ahead, the first run will; see the end of $log"
-  mkdir -p -- "$cache/numba"
-  stamp "$cache/numba/.stamp" "$build_key"
+  stamp "$cache/numba/$sources/.stamp" "$build_key"
+  # Of older sources, keep two for runs that still use them.
+  for old in $(cd "$cache/numba" && ls -t | grep -vx current | tail -n +4); do
+    rm -rf -- "${cache:?}/numba/$old"
+  done
 }
 
 make_test_tools() {

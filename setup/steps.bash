@@ -171,13 +171,15 @@ END
         esac
       done
     setting PYTHONNOUSERSITE 1
-    setting NUMBA_CACHE_DIR "$cache/numba"
+    printf 'export NUMBA_CACHE_DIR=%q"/$(<%q)"\n' "$cache/numba" "$cache/numba/current"
     default ROS_AUTOMATIC_DISCOVERY_RANGE LOCALHOST
     default OPENBLAS_NUM_THREADS 1
     default OMP_NUM_THREADS 1
     echo 'unset -f __maglev_first'
   } >"$file.new"
   mv -f -- "$file.new" "$file"
+  mkdir -p -- "$cache/numba"
+  stamp "$cache/numba/current" "$sources"
   in_environment python -c 'import maglev_msgs.msg, matplotlib, numba, rclpy, rosbags, scipy
 rclpy.init()
 rclpy.shutdown()'

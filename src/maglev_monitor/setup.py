@@ -21,6 +21,7 @@ setup(
             'monitor = maglev_monitor.node:main',
             'recorder = maglev_monitor.recorder:main',
             'analyze = maglev_monitor.analyze:main',
+            'paper_tables = maglev_monitor.paper_tables:main',
         ]
     },
 )

@@ -46,6 +46,8 @@ def recorded(out: Path, topic: str, *fields: str) -> np.ndarray:
     rows: dict[int, list[float]] = {}
     with Reader(out / 'bag') as reader:
         connections = [c for c in reader.connections if c.topic == topic]
+        if not connections:
+            return np.empty((0, 1))
         for connection, _, data in reader.messages(connections=connections):
             message = store.deserialize_cdr(data, connection.msgtype)
             row = [float(message.sequence)]

@@ -2,13 +2,7 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterator
-from typing import NamedTuple
-
-import matplotlib
-
-matplotlib.use('Agg')
 
 import numpy as np
 from matplotlib import pyplot as plt
@@ -17,59 +11,36 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from maglev_monitor.analysis import Analysis
+from maglev_monitor.drawing import (
+    ERROR,
+    FLOOR,
+    MOVES,
+    POSITION,
+    REFERENCE,
+    SECOND,
+    STYLE,
+    TITLES,
+    Plot,
+    column,
+    envelope,
+    extremes,
+    to_plot,
+    units,
+)
 from maglev_monitor.run_series import COLUMNS, StepSeries
 from maglev_monitor.samples import AXES, Phase
-from maglev_monitor.series import Series
 
 FloatArray = NDArray[np.float64]
-
-REFERENCE, POSITION, ERROR, SECOND = '#9a9a9a', '#1f5fa8', '#c2452d', '#2a8a62'
-_TITLES = {
-    'y': 'air gap y',
-    'x': 'displacement x',
-    'z': 'displacement z',
-    'phi': 'tilt φ',
-    'theta': 'tilt θ',
-}
-_FLOOR = 0.1  # of logarithmic error scales [µm, µrad]
-_MOVES = 1e-7  # a reference that moves less stands still [m, rad]
-_STYLE = {
-    'font.size': 9.0,
-    'axes.grid': True,
-    'axes.axisbelow': True,
-    'axes.spines.top': False,
-    'axes.spines.right': False,
-    'grid.color': '#e6e6e6',
-    'axes.titlesize': 9.5,
-    'axes.titleweight': 'bold',
-    'axes.titlelocation': 'left',
-    'legend.frameon': False,
-    'legend.fontsize': 8.0,
-    'figure.constrained_layout.use': True,
-}
-
-
-class Plot(NamedTuple):
-    """One figure of the report: its heading, what it shows, and the PNG."""
-
-    title: str
-    caption: str
-    png: bytes
 
 
 def plots(analysis: Analysis) -> Iterator[Plot]:
     """All figures that the run gives something for, in the order of the report."""
     makers = (_overview, _steps, _tracking, _path, _currents, _timing)
-    with plt.rc_context(_STYLE):
+    with plt.rc_context(STYLE):
         for maker in makers:
             made = maker(analysis)
-            if made is None:
-                continue
-            title, caption, figure = made
-            buffer = io.BytesIO()
-            figure.savefig(buffer, format='png', dpi=120)
-            plt.close(figure)
-            yield Plot(title, caption, buffer.getvalue())
+            if made is not None:
+                yield to_plot(*made)
 
 
 _Made = tuple[str, str, Figure] | None
@@ -81,19 +52,18 @@ def _overview(analysis: Analysis) -> _Made:
     figure, panels = plt.subplots(5, 2, figsize=(11.0, 10.5), sharex=True, squeeze=False)
     for index, axis in enumerate(AXES):
         left, right = panels[index]
-        milli, micro = _units(axis)
+        milli, micro = units(axis)
         _shade(left, analysis, time)
         _shade(right, analysis, time)
-        column = _column(source, index)
-        _envelope(left, time, series, column, 1e3, POSITION, source)
-        reference = 1e3 * series.first[:, _column('reference', index)]
+        envelope(left, time, series, column(source, index), 1e3, POSITION, source)
+        reference = 1e3 * series.first[:, column('reference', index)]
         left.plot(time, reference, color=REFERENCE, lw=0.8, ls='--', label='reference')
-        left.set(ylabel=f'{axis} [{milli}]', title=_TITLES[axis])
-        error = 1e6 * np.abs(_extremes(series, _column(f'{source}_error', index))).max(axis=0)
-        right.fill_between(time, _FLOOR, np.maximum(error, _FLOOR), color=ERROR, lw=0.0, alpha=0.85)
+        left.set(ylabel=f'{axis} [{milli}]', title=TITLES[axis])
+        error = 1e6 * np.abs(extremes(series, column(f'{source}_error', index))).max(axis=0)
+        right.fill_between(time, FLOOR, np.maximum(error, FLOOR), color=ERROR, lw=0.0, alpha=0.85)
         top = max(2.0 * float(np.nanmax(error, initial=0.0)), 10.0)
         right.set(ylabel=f'|e| [{micro}]', title=f'error of {axis}')
-        right.set(yscale='log', ylim=(_FLOOR, top))
+        right.set(yscale='log', ylim=(FLOOR, top))
     panels[0][0].legend(loc='best', ncols=2)
     for panel in panels[-1]:
         panel.set_xlabel('time since lift-off [s]')
@@ -114,17 +84,17 @@ def _tracking(analysis: Analysis) -> _Made:
     figure, panels = plt.subplots(5, 2, figsize=(11.0, 10.5), sharex=True, squeeze=False)
     for index, axis in enumerate(AXES):
         left, right = panels[index]
-        milli, micro = _units(axis)
+        milli, micro = units(axis)
         left.plot(
-            time, 1e3 * values[:, _column(source, index)], color=POSITION, lw=1.3, label=source
+            time, 1e3 * values[:, column(source, index)], color=POSITION, lw=1.3, label=source
         )
-        reference = 1e3 * values[:, _column('reference', index)]
+        reference = 1e3 * values[:, column('reference', index)]
         left.plot(time, reference, color=REFERENCE, lw=0.9, ls='--', label='reference')
-        if np.ptp(reference) < _MOVES:
+        if np.ptp(reference) < MOVES:
             margin = max(2.0 * float(np.nanmax(np.abs(_centred(left, reference)))), 1e-3)
             left.set_ylim(reference[0] - margin, reference[0] + margin)
-        left.set(ylabel=f'{axis} [{milli}]', title=_TITLES[axis])
-        right.plot(time, 1e6 * values[:, _column(f'{source}_error', index)], color=ERROR, lw=0.7)
+        left.set(ylabel=f'{axis} [{milli}]', title=TITLES[axis])
+        right.plot(time, 1e6 * values[:, column(f'{source}_error', index)], color=ERROR, lw=0.7)
         right.axhline(0.0, color='#444444', lw=0.6)
         mean = analysis.result['axes'][axis]['mean_abs_error']
         note = f' — mean |e| over the window {1e6 * mean:.1f} {micro}' if mean is not None else ''
@@ -148,7 +118,7 @@ def _steps(analysis: Analysis) -> _Made:
         (index, step)
         for step in analysis.series.steps
         for index in range(5)
-        if abs(step.target[index] - step.start[index]) > _MOVES
+        if abs(step.target[index] - step.start[index]) > MOVES
     ]
     if not stepped:
         return None
@@ -169,21 +139,21 @@ def _step_panels(
     analysis: Analysis, left: Axes, right: Axes, index: int, steps: list[StepSeries]
 ) -> None:
     axis, source = AXES[index], analysis.result['error_source']
-    milli, micro = _units(axis)
+    milli, micro = units(axis)
     colours = plt.get_cmap('viridis')(np.linspace(0.0, 0.8, len(steps)))
     for step, colour in zip(steps, colours, strict=True):
         time = (step.sequence - step.sequence[0]) * analysis.run.metrics.sample_time
         name = f'{1e3 * step.start[index]:g} → {1e3 * step.target[index]:g} {milli}'
-        _envelope(left, time, step, _column(source, index), 1e3, colour, name)
-        reference = 1e3 * step.first[:, _column('reference', index)]
+        envelope(left, time, step, column(source, index), 1e3, colour, name)
+        reference = 1e3 * step.first[:, column('reference', index)]
         left.plot(time, reference, color=REFERENCE, lw=0.8, ls='--')
-        error = 1e6 * np.abs(_extremes(step, _column(f'{source}_error', index))).max(axis=0)
-        right.semilogy(time, np.maximum(error, _FLOOR), color=colour, lw=0.9)
+        error = 1e6 * np.abs(extremes(step, column(f'{source}_error', index))).max(axis=0)
+        right.semilogy(time, np.maximum(error, FLOOR), color=colour, lw=0.9)
     settings = analysis.run.metrics
     for bound, name in ((settings.settling_bound, 't_s'), (settings.encoder_bound, 't_enc')):
         right.axhline(1e6 * bound[index], color='#444444', lw=0.7, ls=':')
         right.text(0.0, 1.1e6 * bound[index], name, color='#444444', fontsize=7.5)
-    left.set(ylabel=f'{axis} [{milli}]', title=_TITLES[axis], xlabel='time since the step [s]')
+    left.set(ylabel=f'{axis} [{milli}]', title=TITLES[axis], xlabel='time since the step [s]')
     right.set(ylabel=f'|e| [{micro}]', title=f'error of {axis}', xlabel='time since the step [s]')
     left.legend(loc='lower right')
 
@@ -193,7 +163,7 @@ def _path(analysis: Analysis) -> _Made:
     tracked = series.first[:, COLUMNS['phase']][:, 0] == Phase.TRACK
     points = 1e3 * series.first[tracked][:, COLUMNS[source]][:, :3]
     wanted = 1e3 * series.first[tracked][:, COLUMNS['reference']][:, :3]
-    if not len(points) or np.count_nonzero(np.ptp(wanted, axis=0) > 1e3 * _MOVES) < 2:
+    if not len(points) or np.count_nonzero(np.ptp(wanted, axis=0) > 1e3 * MOVES) < 2:
         return None
     figure = plt.figure(figsize=(7.5, 6.0))
     panel = figure.add_subplot(projection='3d')
@@ -226,7 +196,7 @@ def _currents(analysis: Analysis) -> _Made:
             ('direct_current', POSITION, 'i_d'),
             ('quadrature_current', SECOND, 'i_q'),
         ):
-            _envelope(left, time, series, COLUMNS[name].start + motor, 1.0, colour, label)
+            envelope(left, time, series, COLUMNS[name].start + motor, 1.0, colour, label)
         high = series.high[:, COLUMNS['phase_current'].start + motor]
         right.fill_between(
             time, 0.0, high, color=POSITION, lw=0.0, alpha=0.8, label='|phase current|'
@@ -280,32 +250,6 @@ def _time(analysis: Analysis, sequence: NDArray[np.int64]) -> FloatArray:
     start = analysis.series.run.sequence[0]
     time: FloatArray = (sequence - start) * analysis.run.metrics.sample_time
     return time
-
-
-def _column(name: str, index: int) -> int:
-    return int(COLUMNS[name].start) + index
-
-
-def _units(axis: str) -> tuple[str, str]:
-    return ('mrad', 'µrad') if axis in ('phi', 'theta') else ('mm', 'µm')
-
-
-def _extremes(series: Series, column: int) -> FloatArray:
-    return np.stack([series.low[:, column], series.high[:, column]])
-
-
-def _envelope(
-    panel: Axes,
-    time: FloatArray,
-    series: Series,
-    column: int,
-    scale: float,
-    colour: object,
-    label: str,
-) -> None:
-    """One line through least and greatest values in turn, so that every peak is drawn."""
-    both = np.stack([series.low[:, column], series.high[:, column]], axis=1) * scale
-    panel.plot(np.repeat(time, 2), both.ravel(), color=colour, lw=1.0, label=label)
 
 
 def _shade(panel: Axes, analysis: Analysis, time: FloatArray) -> None:
