@@ -16,5 +16,10 @@ setup(
     maintainer_email='maintainers@maglev-stage.org',
     description='Reference trajectories of the maglev stage, and their node',
     license='Apache-2.0',
-    entry_points={'console_scripts': ['reference = maglev_reference.node:main']},
+    entry_points={
+        'console_scripts': [
+            'match = maglev_reference.match:main',
+            'reference = maglev_reference.node:main',
+        ]
+    },
 )

@@ -116,7 +116,13 @@ def test_steps_are_limited_in_size(shaped):
 
 
 def test_a_step_too_quick_is_refused():
-    message = refused({'trajectory': 'steps', 'steps.shaping_time': 0.02})
+    message = refused(
+        {
+            'trajectory': 'steps',
+            'steps.shaping_time': 0.02,
+            'steps.acceleration': [1e3] * 5,  # or it would be given more time
+        }
+    )
     assert 'the speed of y' in message
     assert '[-0.2, 0.2] m/s' in message
 

@@ -135,6 +135,19 @@ def test_the_steps_are_those_of_table_iii(shaped):
     assert_smooth(block, jumps=() if shaped else firsts)
 
 
+@pytest.mark.parametrize(('axis', 'index'), [('x', 1), ('z', 2)])
+def test_a_long_step_takes_the_time_its_acceleration_needs(axis, index):
+    step = {'steps.axis': [axis], 'steps.start': [-0.03], 'steps.target': [0.03]}
+    table = build(ReferenceParameters, {**SHORT, 'trajectory': 'steps', **step})
+    block = whole(Timeline(table))
+    rows = block.phase == Phase.STEP
+    position = block.position[rows, index]
+    assert np.abs(block.acceleration[rows, index]).max() == pytest.approx(5.5, rel=1e-3)
+    assert position[250] < 0.03
+    assert (position[251:] == 0.03).all()
+    assert_smooth(block)
+
+
 def test_hold_is_measured_at_home():
     table = build(ReferenceParameters, {**SHORT, 'trajectory': 'hold'})
     block = whole(Timeline(table))

@@ -326,3 +326,54 @@ def test_an_interrupt_is_heeded_where_it_was_ignored(tree: Tree) -> None:
     output, _ = process.communicate(timeout=20)
     assert process.returncode == 130, output
     assert tree.alive() == []
+
+
+def trajectory(tree: Tree, *options: str) -> tuple[int, str]:
+    """Run the scenario of any trajectory."""
+    process = subprocess.run(
+        [tree.path / 'scenarios' / 'trajectory.sh', *options],
+        cwd=tree.path,
+        env={**os.environ, 'PATH': '/usr/bin:/bin'},
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=False,
+    )
+    return process.returncode, process.stdout + process.stderr
+
+
+def test_a_trajectory_is_chosen_by_name_or_file(tree: Tree) -> None:
+    (tree.path / 'params' / 'scenario_file.yaml').write_text('/**:\n  ros__parameters: {}\n')
+    code, output = trajectory(tree, 'ellipse', '--out', str(tree.out))
+    assert code == 0, output
+    assert 'file.path' not in ' '.join(tree.arguments('reference'))
+    path = tree.path / 'a path.csv'
+    path.write_text('t,y,x,z,phi,theta\n')
+    code, output = trajectory(
+        tree, path.name, '--out', str(tree.path / 'second'), '--duration', '3'
+    )
+    assert code in (0, 1), output  # the stand-in of the monitor writes to the first folder
+    arguments = tree.arguments('reference')
+    assert f"file.path:='{path}'" in arguments
+    assert 'duration:=3.0' in arguments
+    assert str(tree.path / 'params' / 'scenario_file.yaml') in arguments
+
+
+@pytest.mark.parametrize(
+    ('options', 'code', 'words'),
+    [
+        (['elipse'], 2, "the trajectory is 'elipse', it must be one of: ellipse"),
+        (['none.csv'], 2, "cannot read 'none.csv'"),
+        (['--out', 'x'], 2, "the trajectory is '--out'"),
+        ([], 0, 'usage: scenarios/trajectory.sh NAME|FILE.csv'),
+        (['ellipse', '--help'], 0, 'usage: scenarios/trajectory.sh NAME|FILE.csv'),
+        (['ellipse', '--mode', 'fast'], 2, 'must be one of: lockstep realtime'),
+    ],
+)
+def test_a_trajectory_that_makes_no_sense(
+    tree: Tree, options: list[str], code: int, words: str
+) -> None:
+    found, output = trajectory(tree, *options)
+    assert found == code, output
+    assert words in output
+    assert not tree.started()

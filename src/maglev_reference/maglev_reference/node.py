@@ -17,6 +17,7 @@ from maglev_node.parameters import parameter
 from maglev_node.polling import Queues
 from maglev_node.stamp import stamp_now
 from maglev_node.topics import MEASUREMENT, REFERENCE, sample_qos
+from maglev_reference.accuracy import summary, warnings
 from maglev_reference.check import UnreachableError
 from maglev_reference.geometry import outputs
 from maglev_reference.parameters import ReferenceParameters
@@ -74,6 +75,10 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
     def __init__(self) -> None:
         super().__init__('reference', ReferenceNodeParameters)
         Timeline(self.parameters)  # refuses what cannot be followed before anything is waited for
+        for line in warnings(self.parameters):
+            self.get_logger().warning(line)
+        for line in summary(self.parameters):
+            self.get_logger().info(line)
         self.claim(REFERENCE, 'reference')
         self._timeline: Timeline | None = None
         self._expected = self.parameters.watchers + 1  # and the controller
@@ -90,6 +95,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         self.create_service(Trigger, '~/lift_off', self._lift_off)
         self.create_service(Trigger, '~/land', self._land)
         self.create_timer(self.parameters.poll_period, self._poll, clock=self.steady_clock)
+        self.take_realtime_priority()
 
     def _poll(self) -> None:
         measurement = None
@@ -123,6 +129,8 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         return f'waiting for a stage on {MEASUREMENT}'
 
     def _start(self, measurement: Measurement) -> None:
+        if not self.alone():
+            return
         try:
             rest = outputs(
                 measurement.gap, measurement.x, measurement.z, self.parameters.limits.radius

@@ -3,14 +3,34 @@
 from __future__ import annotations
 
 import dataclasses
-import math
-from collections.abc import Sequence
 
 from maglev_node.parameters import ParameterError, group, parameter
 from maglev_reference.geometry import AXES
+from maglev_reference.model_parameters import InternalModelParameters, MachineParameters
+from maglev_reference.trajectory_parameters import (
+    ChirpParameters,
+    CircleParameters,
+    FileParameters,
+    HelixParameters,
+    LissajousParameters,
+    SinusoidParameters,
+    SquareParameters,
+    StepParameters,
+    WaypointParameters,
+)
 
-OMEGA_0 = 1.5 * math.pi  # the paper's w_0 [rad/s]
-TRAJECTORIES = ('hold', 'sinusoids', 'steps')
+TRAJECTORIES = (
+    'hold',
+    'sinusoids',
+    'steps',
+    'circle',
+    'helix',
+    'lissajous',
+    'waypoints',
+    'square',
+    'chirp',
+    'file',
+)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -69,6 +89,14 @@ class Limits:
         upper=0.1,
         length=5,
     )
+    current: float = parameter(
+        6.0,
+        description='greatest phase current of a motor by the machine below, friction included; '
+        'the amplifiers give 7 A, the rest is for feedback',
+        unit='A',
+        lower=0.1,
+        upper=100.0,
+    )
     radius: float = parameter(
         0.397,
         description='r, from the centre of the platen to the centre of a motor',
@@ -86,110 +114,6 @@ class Limits:
                 )
         if not self.motor_gap[0] < self.motor_gap[1]:
             raise ParameterError(f"parameter 'limits.motor_gap' is {self.motor_gap}, it must rise")
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class TiltSinusoids:
-    """offset + sum_i amplitude_i sin(frequency_i t + phase_i); t = 0 as measuring starts."""
-
-    offset: float = parameter(
-        0.0, description='mean position', unit='rad', lower=-0.014, upper=0.014
-    )
-    amplitude: tuple[float, ...] = parameter(
-        (0.0,),
-        description='amplitude of each sinusoid',
-        unit='rad',
-        lower=-0.014,
-        upper=0.014,
-    )
-    frequency: tuple[float, ...] = parameter(
-        (OMEGA_0,),
-        description='angular frequency of each sinusoid',
-        unit='rad/s',
-        lower=0.01,
-        upper=200.0,
-    )
-    phase: tuple[float, ...] = parameter(
-        (0.0,),
-        description='phase of each sinusoid',
-        unit='rad',
-        lower=-2.0 * math.pi,
-        upper=2.0 * math.pi,
-    )
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class GapSinusoids(TiltSinusoids):
-    """The same for the air gap y."""
-
-    offset: float = parameter(
-        0.025, description='mean position', unit='m', lower=0.018, upper=0.031
-    )
-    amplitude: tuple[float, ...] = parameter(
-        (0.0,),
-        description='amplitude of each sinusoid',
-        unit='m',
-        lower=-0.0065,
-        upper=0.0065,
-    )
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class TravelSinusoids(TiltSinusoids):
-    """The same for a displacement, x or z."""
-
-    offset: float = parameter(0.0, description='mean position', unit='m', lower=-0.05, upper=0.05)
-    amplitude: tuple[float, ...] = parameter(
-        (0.0,),
-        description='amplitude of each sinusoid',
-        unit='m',
-        lower=-0.05,
-        upper=0.05,
-    )
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class SinusoidParameters:
-    """Sums of sinusoids, a group for each axis."""
-
-    y: GapSinusoids = group(GapSinusoids)
-    x: TravelSinusoids = group(TravelSinusoids)
-    z: TravelSinusoids = group(TravelSinusoids)
-    phi: TiltSinusoids = group(TiltSinusoids)
-    theta: TiltSinusoids = group(TiltSinusoids)
-
-    def axes(self) -> tuple[TiltSinusoids, ...]:
-        """The five groups in output order."""
-        return (self.y, self.x, self.z, self.phi, self.theta)
-
-    def __post_init__(self) -> None:
-        for name, axis in zip(AXES, self.axes(), strict=True):
-            lengths = (len(axis.amplitude), len(axis.frequency), len(axis.phase))
-            _same_length(f'sinusoids.{name}', ('amplitude', 'frequency', 'phase'), lengths)
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class StepParameters:
-    """A sequence of steps, each of one axis from start to target; the other axes stay at home."""
-
-    axis: tuple[str, ...] = parameter(('y',), description='the axis of each step', choices=AXES)
-    start: tuple[float, ...] = parameter(
-        (0.02,), description='where each step begins', unit='m, rad', lower=-0.05, upper=0.05
-    )
-    target: tuple[float, ...] = parameter(
-        (0.027,), description='where each step ends', unit='m, rad', lower=-0.05, upper=0.05
-    )
-    settle: float = parameter(
-        2.0, description='rest before each step', unit='s', lower=0.0, upper=60.0
-    )
-    shaped: bool = parameter(True, description='minimum-jerk steps; false: the reference jumps')
-    shaping_time: float = parameter(
-        0.2, description='time of a shaped step', unit='s', lower=0.01, upper=10.0
-    )
-
-    def __post_init__(self) -> None:
-        lengths = (len(self.axis), len(self.start), len(self.target))
-        _same_length('steps', ('axis', 'start', 'target'), lengths)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -277,15 +201,14 @@ class ReferenceParameters:
     lift_off: LiftOffParameters = group(LiftOffParameters)
     sinusoids: SinusoidParameters = group(SinusoidParameters)
     steps: StepParameters = group(StepParameters)
+    circle: CircleParameters = group(CircleParameters)
+    helix: HelixParameters = group(HelixParameters)
+    lissajous: LissajousParameters = group(LissajousParameters)
+    waypoints: WaypointParameters = group(WaypointParameters)
+    square: SquareParameters = group(SquareParameters)
+    chirp: ChirpParameters = group(ChirpParameters)
+    file: FileParameters = group(FileParameters)
     landing: LandingParameters = group(LandingParameters)
     limits: Limits = group(Limits)
-
-
-def _same_length(where: str, names: Sequence[str], lengths: Sequence[int]) -> None:
-    if len(set(lengths)) > 1 or lengths[0] == 0:
-        listed = ', '.join(
-            f"'{name}' {length}" for name, length in zip(names, lengths, strict=True)
-        )
-        raise ParameterError(
-            f"parameters of '{where}' need as many elements each, one at least: {listed}"
-        )
+    machine: MachineParameters = group(MachineParameters)
+    internal_model: InternalModelParameters = group(InternalModelParameters)

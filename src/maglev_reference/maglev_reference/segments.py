@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from maglev_reference.check import utilisation, within
+from maglev_reference.currents import current_use
 from maglev_reference.geometry import PHI, FloatArray, Y
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.profiles import (
@@ -20,7 +21,7 @@ from maglev_reference.profiles import (
     minimum_jerk_time,
     state_at,
 )
-from maglev_reference.trajectories import Delayed, steps, trajectory
+from maglev_reference.trajectories import Delayed, course, steps
 
 _STRETCH = 1.25  # from one tried move time to the next
 _TRIALS = 24
@@ -103,7 +104,7 @@ class Planner:
                 self._stand(Phase.HOLD, parameters.steps.settle)
                 self._follow(Phase.STEP, step.motion, parameters.duration, jumps=step.jumps)
         else:
-            path = trajectory(parameters)
+            path = course(parameters).motion
             run_in = self._samples(parameters.run_in) * parameters.sample_time
             self._move(Phase.HOLD, state_at(path, -run_in), parameters.move_time)
             if run_in > 0.0:
@@ -221,7 +222,8 @@ class Planner:
             count = max(1, self._samples(trial))
             time = count * self._parameters.sample_time
             motion = Quintic(self._state, end(time), time)
-            share = utilisation(motion.evaluate(np.linspace(0.0, time, _GRID)), limits)
+            samples = motion.evaluate(np.linspace(0.0, time, _GRID))
+            share = max(utilisation(samples, limits), current_use(samples, self._parameters))
             if chosen is None or within(share) or (best and share < chosen[0]):
                 chosen = (share, motion, count)
             if within(share):

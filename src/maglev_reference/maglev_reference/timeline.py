@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from maglev_reference.check import check_rest, check_samples
+from maglev_reference.currents import check_currents
 from maglev_reference.geometry import FloatArray, Y
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.profiles import Kinematics, State
@@ -232,3 +233,4 @@ class Timeline:
             samples = Kinematics(block.position, block.velocity, block.acceleration)
             jumps = np.isin(np.arange(start, start + count), jumps_at)
             check_samples(samples, start * sample_time, sample_time, self._parameters.limits, jumps)
+            check_currents(samples, start * sample_time, sample_time, self._parameters)

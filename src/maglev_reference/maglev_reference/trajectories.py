@@ -1,44 +1,28 @@
-"""What the platen follows while it is measured: sums of sinusoids, and sequences of steps."""
+"""What the platen follows while it is measured: a course, or a sequence of steps."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from maglev_reference.check import UnreachableError
+from maglev_reference.curves import Chirp, Helix, Sinusoids, Square
 from maglev_reference.geometry import AXES, UNITS, FloatArray
-from maglev_reference.parameters import ReferenceParameters, SinusoidParameters
-from maglev_reference.profiles import Kinematics, Motion, Quintic, Stand, State
+from maglev_reference.parameters import ReferenceParameters
+from maglev_reference.profiles import (
+    Kinematics,
+    Motion,
+    Quintic,
+    Stand,
+    State,
+    minimum_jerk_time,
+)
+from maglev_reference.waypoints import Waypoints
 
-
-class Sinusoids:
-    """Each axis follows offset + sum_i amplitude_i sin(frequency_i t + phase_i), for any time t."""
-
-    def __init__(self, parameters: SinusoidParameters) -> None:
-        self._offset = np.array([axis.offset for axis in parameters.axes()])
-        self._terms = [
-            (index, amplitude, frequency, phase)
-            for index, axis in enumerate(parameters.axes())
-            for amplitude, frequency, phase in zip(
-                axis.amplitude, axis.frequency, axis.phase, strict=True
-            )
-            if amplitude != 0.0
-        ]
-
-    def evaluate(self, time: FloatArray) -> Kinematics:
-        """Position, velocity and acceleration at each time (n,) [s]."""
-        shape = (len(time), 5)
-        position = np.broadcast_to(self._offset, shape).copy()
-        velocity = np.zeros(shape)
-        acceleration = np.zeros(shape)
-        for axis, amplitude, frequency, phase in self._terms:
-            angle = frequency * time + phase
-            sine = amplitude * np.sin(angle)
-            position[:, axis] += sine
-            velocity[:, axis] += amplitude * frequency * np.cos(angle)
-            acceleration[:, axis] -= frequency**2 * sine
-        return Kinematics(position, velocity, acceleration)
+_PERIODS = 200  # of the slowest sinusoid, in which a sum of sinusoids may repeat
+_WHOLE = 1e-3  # share of a period taken for a whole one
 
 
 class Delayed:
@@ -53,11 +37,86 @@ class Delayed:
         return self._motion.evaluate(time + self._start)
 
 
-def trajectory(parameters: ReferenceParameters) -> Motion:
-    """The motion of the tracking window; its time zero is where the window begins."""
-    if parameters.trajectory == 'sinusoids':
-        return Sinusoids(parameters.sinusoids)
-    return Stand(np.array(parameters.home))
+class Course(NamedTuple):
+    """The motion of the tracking window; its time zero is where the window begins.
+
+    ``period`` [s] is when it repeats, ``length`` [s] how long a course is that does not; a sum of
+    sinusoids may have neither. ``lines`` are the angular frequencies [rad/s] of each output, where
+    they are known beforehand.
+    """
+
+    motion: Motion
+    period: float | None = None
+    length: float | None = None
+    lines: tuple[tuple[float, ...], ...] = ((),) * 5
+
+
+class Passing(Motion, Protocol):
+    """A motion that has an end, ``length`` [s], or repeats from there."""
+
+    length: float
+    repeats: bool
+
+
+def course(parameters: ReferenceParameters) -> Course:
+    """The course of ``trajectory``, which is not ``steps``.
+
+    Raises ParameterError for what cannot be built: a file that is not as it must be, corners
+    larger than their square.
+    """
+    home = np.array(parameters.home)
+    match parameters.trajectory:
+        case 'sinusoids':
+            return _lined(Sinusoids.sums(parameters.sinusoids))
+        case 'circle':
+            return _lined(Sinusoids.circle(parameters.circle, home))
+        case 'lissajous':
+            return _lined(Sinusoids.lissajous(parameters.lissajous, home))
+        case 'helix':
+            helix = Helix(parameters.helix, home)
+            return Course(helix, period=helix.period)
+        case 'square':
+            square = Square(parameters.square, home)
+            return Course(square, period=square.period)
+        case 'waypoints':
+            return _passing(Waypoints(parameters.waypoints, parameters.sample_time))
+        case 'file':
+            from maglev_reference.path_file import PathFile
+
+            return _passing(PathFile(parameters.file))
+        case 'chirp':
+            chirp = Chirp(parameters.chirp, home)
+            lines: list[tuple[float, ...]] = [()] * 5
+            lines[chirp.axis] = parameters.chirp.frequency
+            return Course(chirp, length=chirp.length, lines=tuple(lines))
+        case _:
+            return Course(Stand(home))
+
+
+def _lined(sinusoids: Sinusoids) -> Course:
+    lines = tuple(
+        tuple(sorted({term.frequency for term in sinusoids.terms if term.axis == axis}))
+        for axis in range(5)
+    )
+    return Course(sinusoids, period=_common_period(lines), lines=lines)
+
+
+def _common_period(lines: tuple[tuple[float, ...], ...]) -> float | None:
+    """The time [s] in which every frequency makes whole periods, None when there is none."""
+    frequencies = np.array(sorted({line for axis in lines for line in axis}))
+    if not frequencies.size:
+        return None
+    for count in range(1, _PERIODS + 1):
+        made = count * frequencies / frequencies[0]
+        if np.abs(made - np.round(made)).max() < _WHOLE:
+            return 2.0 * math.pi * count / float(frequencies[0])
+    return None
+
+
+def _passing(motion: Passing) -> Course:
+    if motion.repeats:
+        return Course(motion, period=motion.length)
+    return Course(motion, length=motion.length)
 
 
 class Step(NamedTuple):
@@ -88,6 +147,8 @@ def steps(parameters: ReferenceParameters) -> list[Step]:
         before[index], after[index] = start, target
         motion: Motion = Stand(after)
         if table.shaped:
-            motion = Quintic(State.at_rest(before), State.at_rest(after), table.shaping_time)
+            least = minimum_jerk_time(target - start, math.inf, table.acceleration[index])
+            duration = max(table.shaping_time, least)
+            motion = Quintic(State.at_rest(before), State.at_rest(after), duration)
         found.append(Step(before, after, motion, not table.shaped))
     return found
