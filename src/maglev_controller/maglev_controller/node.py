@@ -16,9 +16,11 @@ from maglev_msgs.msg import ControllerState, Currents, Measurement, Reference
 from maglev_node.node import MaglevNode, SourceParameters
 from maglev_node.node import main as run_main
 from maglev_node.parameters import build, parameter, specs, values
+from maglev_node.polling import Queues
 from maglev_node.stamp import copy_stamp, stamp_now
 from maglev_node.topics import CONTROLLER_STATE, CURRENTS, MEASUREMENT, REFERENCE, sample_qos
 
+_REFERENCE_PERIOD = 2e-3  # between two looks at what references have arrived [s]
 _HAND_PERIOD = 2e-4  # between two looks at the queues during a redesign [s]
 _SILENCE = 0.5  # without a sample for this long the stage is taken for stopped [s]
 
@@ -70,17 +72,16 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         self._state_publisher = self.create_publisher(
             ControllerState, CONTROLLER_STATE, sample_qos()
         )
+        self._queues = Queues(self)
+        self._references = self._queues.subscribe(REFERENCE, Reference)
         newest = sample_qos() if self._lockstep else sample_qos(depth=1)
-        self._loop = tuple(
-            (self.create_subscription(message_type, topic, callback, qos), callback)
-            for message_type, topic, callback, qos in (
-                (Reference, REFERENCE, self._on_reference, sample_qos()),
-                (Measurement, MEASUREMENT, self._on_measurement, newest),
-            )
+        self._measurements = self.create_subscription(
+            Measurement, MEASUREMENT, self._on_measurement, newest
         )
         self.create_service(SetBool, '~/enable', self._on_enable)
         self.create_service(Trigger, '~/emergency_stop', self._on_emergency_stop)
         self.create_service(Trigger, '~/reset', self._on_reset)
+        self.create_timer(_REFERENCE_PERIOD, self._take_references, clock=self.steady_clock)
         self.create_timer(0.05, self._watch, clock=self.steady_clock)
         self.take_realtime_priority()
         for line in self.supervisor.regulator.describe_loops():
@@ -88,19 +89,20 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         # The first line a process logs takes 20 ms, so it must not be one that is logged in flight.
         self.get_logger().info(f'{self.parameters.mode}, waiting for {MEASUREMENT}')
 
-    def _on_reference(self, message: Reference) -> None:
-        self.supervisor.references.store(
-            message.sequence,
-            message.phase,
-            message.segment,
-            message.position,
-            message.velocity,
-            message.acceleration,
-        )
-        self._reference_lost = False
-        self._reference_over = message.phase == Phase.END
-        if self._pending is not None and message.sequence == self._pending.sequence:
-            self._answer(self._pending)
+    def _take_references(self) -> None:
+        """Take what has arrived ahead of time, in bursts: being woken for each slows the loop."""
+        for message, _ in self._references.take():
+            self.supervisor.references.store(
+                message.sequence,
+                message.phase,
+                message.segment,
+                message.position,
+                message.velocity,
+                message.acceleration,
+            )
+            self._reference_lost = False
+            self._reference_over = message.phase == Phase.END
+        self._answer_pending()
 
     def _on_measurement(self, message: Measurement) -> None:
         sequence = message.sequence
@@ -114,6 +116,10 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
             self.supervisor.restart()
         elif sequence - self._sequence > self._longest_gap and self.supervisor.flying:
             self.supervisor.cut(f'{sequence - self._sequence - 1} measurements are missing')
+        if self.supervisor.references.newest < sequence:
+            self._take_references()
+            if self._sequence == sequence:  # it was pending, and is answered
+                return
         if self._lockstep and self._awaits_reference(sequence):
             if self._pending is None or self._pending.sequence != sequence:
                 self._pending, self._pending_since = message, time.monotonic()
@@ -239,10 +245,10 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
 
     def _serve_by_hand(self) -> None:
         """What the executor does for the loop, while it waits for a callback of ours."""
-        for subscription, callback in self._loop:
-            with subscription.handle:
-                while taken := subscription.handle.take_message(subscription.msg_type, False):
-                    callback(taken[0])
+        self._take_references()
+        with self._measurements.handle:
+            while taken := self._measurements.handle.take_message(Measurement, False):
+                self._on_measurement(taken[0])
 
     def diagnose(self) -> tuple[bytes, str, Mapping[str, object]]:
         """ERROR in a fault and in a landing nobody asked for."""
@@ -258,6 +264,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         self.supervisor.cut('shut down')
         if self._sequence >= 0:
             self._publish_currents(self._sequence)
+        self._queues.destroy()
 
 
 def main() -> None:
