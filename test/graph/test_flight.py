@@ -176,7 +176,9 @@ def test_retuning_in_flight_is_checked_and_bumpless(
         if message.sequence > after - 3000 and message.mode == ControllerState.REGULATING
     ]
     assert tracking[-1].sequence > after - 5, graph['controller'].output
-    assert np.max(np.abs([message.error[:3] for message in tracking])) < 50e-6
+    # In real time the parameter service itself holds the loop up for some samples.
+    bound = {'lockstep': 50e-6, 'realtime': 500e-6}[mode]
+    assert np.max(np.abs([message.error[:3] for message in tracking])) < bound
     assert 'currents cut' not in graph['plant'].output
 
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
+import functools
 import math
 from collections.abc import Callable
 
 import numpy as np
 
 from maglev_controller.parameters import ControllerParameters
-from maglev_controller.regulator import Regulator
+from maglev_controller.regulator import MeasurementFault, Regulator
 from maglev_hw_bridge.drivers.emulated import EmulatedBoards
 from maglev_hw_bridge.drivers.quanser import QuanserDriver
 from maglev_hw_bridge.parameters import BridgeParameters
@@ -40,6 +42,12 @@ def hover(*position: float) -> Target:
     return lambda _time: (place, np.zeros(5), np.zeros(5))
 
 
+@functools.cache
+def _regulator() -> Regulator:
+    """Designed once; each flight begins with it at rest."""
+    return Regulator(ControllerParameters())
+
+
 class Flight:
     """A platen in flight along a target from the start on; one :meth:`step` a sample."""
 
@@ -49,7 +57,8 @@ class Flight:
         self.rig = self.boards.rig
         driver = QuanserDriver(parameters, self.boards, self.boards.now)
         self.stage = BridgeStage(parameters, driver=driver)
-        self.regulator = Regulator(ControllerParameters())
+        self.regulator = _regulator()
+        self.regulator.reset()
         self.target = target
         self.stage.configure()
         position, velocity, _ = target(0.0)
@@ -64,9 +73,11 @@ class Flight:
         """One sample: read, and the regulator's answer, or none."""
         sample = self.stage.read()
         if controlled:
-            self.regulator.step(
-                *sample, *self.target(1e-3 * self.samples), self._i_d, self._i_q
-            )
+            try:
+                target = self.target(1e-3 * self.samples)
+                self.regulator.step(*sample, *target, self._i_d, self._i_q)
+            except MeasurementFault:
+                self._i_d[:] = self._i_q[:] = 0.0
             self.stage.write(self._i_d, self._i_q)
         else:
             self.stage.hold()
@@ -75,10 +86,8 @@ class Flight:
     def run(self, samples: int, controlled: bool = True) -> None:
         """So many samples; ends when the boards are lost."""
         for _ in range(samples):
-            try:
+            with contextlib.suppress(StageError):
                 self.step(controlled and self.stage.mode is Mode.FOLLOWING)
-            except StageError:
-                pass
             if self.stage.fault is not None and self.detected is None:
                 self.detected = self.samples
             if self.stage.mode is Mode.LOST:

@@ -1,0 +1,104 @@
+"""At what speed the platen meets its stop: landed by the bridge, and with the current cut.
+
+On emulated boards, from several heights at rest and from the paper's ellipse in 4DOF at full speed.
+"foretold" is what the bridge itself computes at a cut. Exits with 1 when a landing is not soft.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+
+import numpy as np
+
+from maglev_hw_bridge.drivers.emulated import EmulatedDriver
+from maglev_hw_bridge.landing import currents, impact_of_cut
+from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.stage import BridgeStage, Mode, open_stage
+from maglev_node.parameters import build
+
+SOFT = 0.05  # [m/s]
+HEIGHTS = (0.019, 0.020, 0.0225, 0.025, 0.0275, 0.0285, 0.030)  # air gap [m]
+OMEGA = 1.5 * math.pi  # of the ellipse [rad/s]
+
+
+Motion = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Position, velocity and acceleration of y, x, z, phi, theta, shape (5,) each."""
+
+
+def ellipse(phase: float) -> Motion:
+    """The motion on the ellipse at a phase [rad]."""
+    amplitude = np.array([0.005, 0.03, 0.03, 0.0, 0.01])
+    angle = phase + np.array([-0.5 * math.pi, -0.5 * math.pi, 0.0, 0.0, 0.0])
+    position = amplitude * np.sin(angle) + np.array([0.025, 0.0, 0.0, 0.0, 0.0])
+    return position, amplitude * OMEGA * np.cos(angle), -amplitude * OMEGA**2 * np.sin(angle)
+
+
+def airborne(motion: Motion) -> tuple[BridgeStage, EmulatedDriver]:
+    """A bridge whose platen is in that motion."""
+    position, velocity, acceleration = motion
+    home = {'homing.at_start': True, 'homing.x': 0.0, 'homing.z': 0.0}
+    stage = open_stage(build(BridgeParameters, home))
+    driver = stage.driver
+    assert isinstance(driver, EmulatedDriver)
+    stage.deactivate()
+    driver.boards.rig.place(position, velocity)
+    stage.activate()
+    i_d, i_q = np.zeros(4), np.zeros(4)
+    for _ in range(8):
+        stage.read()
+        watched = stage.guard.arrays
+        currents(watched.machine, watched.position, acceleration, 7.0, i_d, i_q)
+        stage.write(i_d, i_q)
+    stage.read()
+    driver.boards.rig.forget_impact()
+    return stage, driver
+
+
+def landed(motion: Motion) -> float:
+    """Speed at the stop when the bridge lands [m/s]."""
+    stage, driver = airborne(motion)
+    stage.land('benchmark')
+    while stage.mode is Mode.LANDING:
+        stage.hold()
+        stage.read()
+    for _ in range(300):
+        stage.hold()
+        stage.read()
+    assert stage.fault is None, stage.fault
+    return driver.boards.rig.impact
+
+
+def cut(motion: Motion) -> tuple[float, float, str]:
+    """Speed at the stop when the current is cut: as it is, as foretold [m/s]; which stop."""
+    stage, driver = airborne(motion)
+    watched = stage.guard.arrays
+    foretold, stop = impact_of_cut(stage.parameters, watched.position[0], watched.rate[0])
+    stage.deactivate()
+    for _ in range(3000):
+        driver.boards.tick()
+    return driver.boards.rig.impact, foretold, stop
+
+
+def main() -> int:
+    """Print the table; tell by the exit code whether every landing was soft."""
+    still = np.zeros(5)
+    places: list[tuple[str, Motion]] = [
+        (f'at rest, y = {y * 1e3:.1f} mm', (np.array([y, 0.0, 0.0, 0.0, 0.0]), still, still))
+        for y in HEIGHTS
+    ]
+    for degrees in range(0, 360, 45):
+        places.append((f'on the ellipse, {degrees} deg', ellipse(math.radians(degrees))))
+    worst = 0.0
+    print(f'{"m/s at the stop":26}{"landed":>8}{"cut":>8}{"foretold":>10}  stop')
+    for name, motion in places:
+        soft = landed(motion)
+        hard, foretold, stop = cut(motion)
+        worst = max(worst, soft)
+        print(f'{name:26}{soft:8.3f}{hard:8.2f}{foretold:10.2f}  {stop}')
+    print(f'landed: {worst:.3f} m/s at most, limit {SOFT:g} m/s')
+    return int(worst > SOFT)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""The real stage behind the stage contract."""

@@ -1,0 +1,255 @@
+"""Bring a machine up step by step at low current, saying what is seen and what to change.
+
+No graph is needed, and nothing else may use the boards meanwhile. Before every step it asks;
+outputs are at 0 V while it waits. The first thing that is wrong ends it, with exit code 1.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maglev_hw_bridge.diagnosis import diagnose
+from maglev_hw_bridge.drivers import Driver, DriverError, make_driver
+from maglev_hw_bridge.encoders import Encoders, HomingError
+from maglev_hw_bridge.landing import currents
+from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.response import Pulses, Twin
+from maglev_hw_bridge.signal_parameters import ENCODER_NAMES, PHASE_NAMES, PHASES
+from maglev_hw_bridge.stage import BridgeStage, Mode
+from maglev_node.parameters import ParameterError, from_yaml
+from maglev_node.stage import StageError
+
+FloatArray = NDArray[np.float64]
+
+_HOP = 5e-4  # first lift-off [m]
+_RISE, _HOVER = 0.5, 0.5  # [s]
+_TILT = 5e-4  # more tilt than this in the first lift-off is wrong [rad]
+
+
+class WrongError(Exception):
+    """A step found something wrong; the message says what to change."""
+
+
+class StoppedError(Exception):
+    """The operator does not want to go on."""
+
+
+class Commissioning:
+    """The steps, on one machine; ``ask`` is called before each with what it does."""
+
+    def __init__(
+        self,
+        parameters: BridgeParameters,
+        driver: Driver,
+        *,
+        peak: float,
+        ask: Callable[[str], None],
+        tell: Callable[[str], None] = print,
+    ) -> None:
+        self._parameters, self._driver = parameters, driver
+        self._peak, self._ask, self._tell = peak, ask, tell
+        self._realtime = parameters.driver != 'emulated'
+        self._encoders = Encoders(parameters)
+        self._counts = np.zeros(6, dtype=np.int32)
+
+    def run(self) -> None:
+        """All steps. Raises WrongError, StoppedError, DriverError, StageError."""
+        self._boards()
+        try:
+            self._homing()
+            self._phases()
+        finally:
+            self._driver.close()
+        self._first_lift_off()
+
+    def _boards(self) -> None:
+        self._ask('open and check the boards; outputs stay at 0 V')
+        self._driver.open()
+        self._driver.counts(self._counts)
+        self._encoders.start(self._counts)
+        for name, count in zip(ENCODER_NAMES, self._counts, strict=True):
+            self._tell(f'  encoder {name}: {count} counts')
+        if self._driver.stop_pressed:
+            raise WrongError(
+                'the emergency stop input is active: release it, or check boards.stop_input and '
+                'boards.stop_level'
+            )
+
+    def _homing(self) -> None:
+        home = self._parameters.homing
+        self._ask(
+            'home: the platen rests on its lower stop, held by nothing, at x = '
+            f'{home.x * 1e3:g} mm, z = {home.z * 1e3:g} mm'
+        )
+        readings = np.zeros((home.samples, 6), dtype=np.int32)
+        for row in readings:
+            self._driver.counts(row)
+            if self._realtime:
+                time.sleep(self._parameters.sample_time)
+        try:
+            self._encoders.home(readings)
+        except HomingError as error:
+            raise WrongError(str(error)) from error
+        self._tell('  at rest; zeros taken')
+
+    def _phases(self) -> None:
+        machine = self._parameters.machine
+        self._ask(
+            'put the platen near the middle, still on its stop, where it can move 20 mm along X '
+            'and Z'
+        )
+        self._driver.counts(self._counts)
+        place = self._encoders.decode(self._counts)[4:]
+        if np.max(np.abs(place)) > 0.5 * min(machine.x_max, machine.z_max):
+            raise WrongError(
+                f'the encoders have the platen at x = {place[0] * 1e3:.1f} mm, z = '
+                f'{place[1] * 1e3:.1f} mm, too far from the middle: move it, or check encoder '
+                'x and z (resolution, direction, cable)'
+            )
+        pulses = Pulses(self._parameters, self._driver, self._encoders, self._peak)
+        twin = Twin(self._parameters, self._peak)
+        seen, foretold = [], []
+        for phase in range(PHASES):
+            if phase % 3 == 0:
+                self._ask(f'motor {phase // 3 + 1}: up to {self._peak:g} A in each phase alone')
+            foretold.append(twin.phase(phase, pulses.place))
+            seen.append(pulses.phase(phase))
+            self._tell(f'  {PHASE_NAMES[phase]}: {_in_words(seen[-1])}')
+        finding = diagnose(np.array(seen), np.array(foretold))
+        if not finding.fine:
+            raise WrongError(finding.text)
+        self._tell(f'  {finding.text}')
+
+    def _first_lift_off(self) -> None:
+        self._ask(
+            f'first lift-off by {_HOP * 1e3:g} mm for {_RISE + _HOVER:g} s, then landing; the '
+            'platen rests where it was homed or was moved to by hand'
+        )
+        stage = BridgeStage(self._parameters, realtime=self._realtime, driver=self._driver)
+        try:
+            stage.configure()
+            stage.encoders.arrays.zero[:] = self._encoders.arrays.zero
+            stage.activate()
+            highest, tilt = _hop(stage, self._parameters)
+        finally:
+            stage.close()
+        if stage.fault is not None:
+            raise WrongError(f'{stage.fault}; check machine.* and the currents')
+        if not 0.5 * _HOP < highest < 1.5 * _HOP or tilt > _TILT:
+            raise WrongError(
+                f'it rose {highest * 1e3:.2f} mm and tilted {tilt * 1e3:.2f} mrad: check '
+                'amplifier.gain, amplifier.offset, commutation.* and machine.*'
+            )
+        self._tell(f'  rose {highest * 1e3:.2f} mm, tilted {tilt * 1e3:.2f} mrad at most, landed')
+
+
+def _in_words(response: FloatArray) -> str:
+    """What one phase's pulses moved."""
+    texts = []
+    for sign, moved in zip('+-', response, strict=True):
+        parts = [
+            f'{name} {move * 1e6:+.0f} um'
+            for name, move in zip(ENCODER_NAMES, moved, strict=True)
+            if abs(move) > 3e-5
+        ]
+        texts.append(f'{sign}: {", ".join(parts) or "nothing moves"}')
+    return '; '.join(texts)
+
+
+def _hop(stage: BridgeStage, parameters: BridgeParameters) -> tuple[float, float]:
+    """Rise, hover, land: greatest rise [m] and tilt [rad] while it hovers."""
+    period, landing = parameters.sample_time, parameters.landing
+    stiffness, damping = np.array(landing.stiffness), np.array(landing.damping)
+    watched, machine = stage.guard.arrays, stage.landing.arrays.machine
+    i_d, i_q = np.zeros(4), np.zeros(4)
+    stage.read()
+    stage.hold()
+    stage.read()
+    target = watched.position.copy()
+    start, rest = target[0], parameters.machine.gap_max
+    target[3:] = 0.0
+    heights, tilt = [], 0.0
+    for n in range(round((_RISE + _HOVER) / period)):
+        share = min(n * period / _RISE, 1.0)
+        target[0] = start - _HOP * share**2 * (3.0 - 2.0 * share)
+        wanted = stiffness * (target - watched.position) - damping * watched.rate
+        currents(machine, watched.position, wanted, landing.current, i_d, i_q)
+        stage.write(i_d, i_q)
+        stage.read()
+        if share >= 1.0:
+            heights.append(rest - watched.position[0])
+            tilt = max(tilt, float(np.max(np.abs(watched.position[3:]))))
+        if stage.mode is not Mode.FOLLOWING:
+            break
+    stage.land('commissioned')
+    while stage.flying or stage.mode is Mode.LANDING:
+        stage.hold()
+        stage.read()
+    return float(np.mean(heights)) if heights else 0.0, tilt
+
+
+def _ask_operator(step: str) -> None:
+    print(f'\n{step}', flush=True)
+    answer = input('  go on? [y/N] ').strip().lower()
+    if answer not in ('y', 'yes'):
+        raise StoppedError
+
+
+def _announce(step: str) -> None:
+    print(f'\n{step}', flush=True)
+
+
+def _load(files: Sequence[str]) -> BridgeParameters:
+    from maglev_hw_bridge.node import BridgeNodeParameters  # with ROS, only needed here
+
+    return from_yaml(BridgeNodeParameters, 'hw_bridge', *files)
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """The executable ``commission``; returns its exit code, 0 when every step was fine."""
+    parser = argparse.ArgumentParser(prog='commission', description=__doc__)
+    parser.add_argument(
+        '--params',
+        action='append',
+        default=[],
+        metavar='FILE',
+        help='parameter file of hw_bridge; repeatable, the last one wins',
+    )
+    parser.add_argument(
+        '--current',
+        type=float,
+        default=1.5,
+        metavar='A',
+        help='largest current of a phase alone, 0.2 to 3 A (default 1.5)',
+    )
+    parser.add_argument('--yes', action='store_true', help='do not ask before each step')
+    options = parser.parse_args(arguments)
+    if not 0.2 <= options.current <= 3.0:
+        parser.error(f'--current is {options.current:g} A, it must lie in [0.2, 3]')
+    try:
+        parameters = _load(options.params)
+        driver = make_driver(parameters, realtime=parameters.driver != 'emulated')
+        ask = _announce if options.yes else _ask_operator
+        Commissioning(parameters, driver, peak=options.current, ask=ask).run()
+    except WrongError as error:
+        print(f'\ncommission: wrong: {error}', file=sys.stderr)
+        return 1
+    except (ParameterError, DriverError, StageError) as error:
+        print(f'commission: error: {error}', file=sys.stderr)
+        return 1
+    except (StoppedError, EOFError, KeyboardInterrupt):
+        print('\ncommission: stopped; outputs are at 0 V', file=sys.stderr)
+        return 130
+    print('\ncommission: all is well')
+    return 0
+
+
+def main() -> None:
+    """Entry point of the executable ``commission``."""
+    sys.exit(run())

@@ -1,0 +1,110 @@
+"""Which single error in the wiring, or in its parameters, explains what the phases move."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maglev_hw_bridge.signal_parameters import ENCODER_NAMES, ENCODERS, PHASE_NAMES, PHASES
+
+FloatArray = NDArray[np.float64]
+
+_SEEN = np.array([3e-5] * 4 + [1e-4] * 2)  # less is no answer [m]
+_CLEAR = np.array([1.2e-4] * 4 + [4e-4] * 2)  # more says no more [m]
+_MARGIN = 0.01  # by which one explanation must beat the next
+_WORST = 0.12  # an explanation further off explains nothing
+
+
+class Finding(NamedTuple):
+    """What the responses mean."""
+
+    fine: bool
+    text: str
+
+
+def diagnose(seen: FloatArray, foretold: FloatArray) -> Finding:
+    """Judge what was seen, (12, 2, 6) [m], by what the parameters' wiring would show.
+
+    First index the phase, then the current's sign (+, -), then the encoder.
+    """
+    silent = _silent(seen, foretold)
+    if silent:
+        return Finding(False, silent)
+    wanted = _shape(seen)
+    ranked = sorted(
+        (
+            (float(np.mean(np.abs(_shape(shown) - wanted))), text)
+            for text, shown in _explanations(foretold)
+        ),
+        key=lambda entry: entry[0],
+    )
+    (best, text), (next_best, other) = ranked[:2]
+    if best > _WORST:
+        return Finding(
+            False,
+            'no single error explains this: check all wiring against amplifier.* and encoder.*',
+        )
+    if next_best - best < _MARGIN:
+        return Finding(False, f'either: {text or "all is well"}; or: {other or "all is well"}')
+    return Finding(not text, text or 'every phase and every encoder is as the parameters say')
+
+
+def _shape(response: FloatArray) -> FloatArray:
+    """Responses by direction and clearness, within -1 and 1."""
+    shape: FloatArray = np.clip(response / _CLEAR, -1.0, 1.0)
+    return shape
+
+
+def _silent(seen: FloatArray, foretold: FloatArray) -> str:
+    answered = np.abs(seen) > _SEEN
+    for phase in range(PHASES):
+        if not answered[phase].any():
+            return (
+                f'{PHASE_NAMES[phase]} moves nothing: check its amplifier, its cable, and element '
+                f'{phase} of amplifier.board and amplifier.channel'
+            )
+    expected = np.abs(foretold) > _SEEN
+    for encoder in range(ENCODERS):
+        if expected[:, :, encoder].any() and not answered[:, :, encoder].any():
+            return (
+                f'encoder {ENCODER_NAMES[encoder]} sees nothing: check its cable, and element '
+                f'{encoder} of encoder.board and encoder.channel'
+            )
+    return ''
+
+
+def _explanations(foretold: FloatArray) -> Iterator[tuple[str, FloatArray]]:
+    """Every single error, in words, with what it would show; without words: none."""
+    yield '', foretold
+    for phase, name in enumerate(PHASE_NAMES):
+        shown = foretold.copy()
+        shown[phase] = foretold[phase, ::-1]
+        yield f'{name} is turned round: change the sign of element {phase} of amplifier.sign', shown
+    for encoder, name in enumerate(ENCODER_NAMES):
+        shown = foretold.copy()
+        shown[:, :, encoder] *= -1.0
+        yield (
+            f'encoder {name} counts the other way: change the sign of element {encoder} of '
+            'encoder.direction',
+            shown,
+        )
+    for one, two in combinations(range(PHASES), 2):
+        shown = foretold.copy()
+        shown[[one, two]] = foretold[[two, one]]
+        yield (
+            f'{PHASE_NAMES[one]} and {PHASE_NAMES[two]} are exchanged: exchange elements {one} and '
+            f'{two} of amplifier.board and of amplifier.channel',
+            shown,
+        )
+    for one, two in combinations(range(ENCODERS), 2):
+        shown = foretold.copy()
+        shown[:, :, [one, two]] = foretold[:, :, [two, one]]
+        yield (
+            f'encoders {ENCODER_NAMES[one]} and {ENCODER_NAMES[two]} are exchanged: exchange '
+            f'elements {one} and {two} of encoder.board and of encoder.channel',
+            shown,
+        )

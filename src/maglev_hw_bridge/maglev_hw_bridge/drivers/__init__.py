@@ -1,0 +1,82 @@
+"""Drivers: what moves counts and volts between the bridge and the boards.
+
+A driver is one module in this package with a function ``make(parameters, realtime)`` that returns
+a :class:`Driver`; the parameter ``driver`` names it.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_node.parameters import ParameterError
+
+CountArray = NDArray[np.int32]
+VoltArray = NDArray[np.float64]
+
+
+class DriverError(RuntimeError):
+    """The boards cannot be used (any more); the message says why and what to do."""
+
+
+class WatchdogError(DriverError):
+    """The boards' watchdog expired: they put out 0 V and refuse everything until they are reset."""
+
+
+class Driver(Protocol):
+    """What the bridge asks of the boards, in this order; every call may raise DriverError.
+
+    :meth:`open`, :meth:`counts` any time, :meth:`start`, then :meth:`read` and :meth:`write` once a
+    sample, :meth:`stop`, :meth:`close`. After :meth:`stop` it may be started again.
+    """
+
+    late: float
+    """By how much the sample read last was behind its tick [s]."""
+
+    stop_pressed: bool
+    """Whether the emergency stop input was active at the last :meth:`read`."""
+
+    def open(self) -> None:
+        """Open and check the boards, with outputs at 0 V."""
+        ...
+
+    def counts(self, counts: CountArray) -> None:
+        """Write what the six encoders count right now, without waiting, into ``counts`` (6,)."""
+        ...
+
+    def start(self) -> None:
+        """Arm the watchdog, enable the amplifiers and start the clock that paces :meth:`read`."""
+        ...
+
+    def read(self, counts: CountArray) -> None:
+        """Wait for the next sample and write what the six encoders count into ``counts`` (6,)."""
+        ...
+
+    def write(self, volts: VoltArray) -> None:
+        """Put out the volts of the twelve phases, shape (12,), and reload the watchdog."""
+        ...
+
+    def stop(self) -> None:
+        """Outputs at 0 V, amplifiers disabled, watchdog and clock stopped."""
+        ...
+
+    def close(self) -> None:
+        """Release the boards with outputs at 0 V; may be called twice and must not raise."""
+        ...
+
+
+def make_driver(parameters: BridgeParameters, realtime: bool) -> Driver:
+    """The driver that ``driver`` names. Raises ParameterError when there is none of that name."""
+    known = sorted(module.name for module in pkgutil.iter_modules(__path__))
+    if parameters.driver not in known:
+        raise ParameterError(
+            f"parameter 'driver' is '{parameters.driver}', it must be one of {', '.join(known)}"
+        )
+    module = importlib.import_module(f'{__name__}.{parameters.driver}')
+    driver: Driver = module.make(parameters, realtime)
+    return driver

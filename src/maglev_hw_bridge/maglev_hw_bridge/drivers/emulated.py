@@ -1,0 +1,186 @@
+"""Emulated boards: what the vendor's HIL module looks like, with the stage's physics behind it.
+
+The real driver runs on them unchanged. Lockstep: the boards' time stands still until a sample is
+waited for. Real time: it follows the machine's clock, however late one reads.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maglev_hw_bridge.drivers.quanser import QuanserDriver
+from maglev_hw_bridge.emulated_card import Clock, Code, DigitalState, EmulatedCard, HILError
+from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.rig import Rig
+from maglev_hw_bridge.signal_parameters import CHANNELS
+
+
+def make(parameters: BridgeParameters, realtime: bool) -> EmulatedDriver:
+    """The Quanser driver on emulated boards."""
+    return EmulatedDriver(parameters, EmulatedBoards(parameters, realtime))
+
+
+class Truth(NamedTuple):
+    """What is behind a sample."""
+
+    state: NDArray[np.float64]  # (10,) x1..x10
+    current: NDArray[np.float64]  # (8,) i_d of motors 1..4, then i_q, flowing [A]
+
+
+class EmulatedDriver(QuanserDriver):
+    """The Quanser driver, which on emulated boards can also tell the truth."""
+
+    def __init__(self, parameters: BridgeParameters, boards: EmulatedBoards) -> None:
+        super().__init__(parameters, boards, boards.now)
+        self.boards = boards
+        self._first = 0
+
+    def start(self) -> None:
+        """Start, and remember the boards' tick."""
+        super().start()
+        self._first = self.boards.ticks
+
+    def truth(self) -> Truth:
+        """The true state of the sample read last, even where it was read late."""
+        row = self.boards.past[(self._first + self._ticks) % len(self.boards.past)]
+        return Truth(row[:10], row[10:])
+
+
+class EmulatedBoards:
+    """Stands in for the vendor's module, and is the world behind its boards.
+
+    Faults, from now on: ``stuck``, ``jumps`` (counts added) by encoder; ``dead(phase)``;
+    ``delay(samples)``; ``failing`` (every call raises); ``stop_pressed``; :meth:`expire`.
+    """
+
+    HILError = HILError
+    Clock = Clock
+    DigitalState = DigitalState
+
+    def __init__(
+        self,
+        parameters: BridgeParameters,
+        realtime: bool = False,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self.rig = Rig(parameters)
+        self.parameters = parameters
+        self.period = parameters.sample_time
+        self.realtime = realtime
+        self._clock, self._sleep = clock, sleep
+        self._started = clock()
+        self.ticks = 0
+        self.cards: dict[str, EmulatedCard] = {}
+        self.volts = np.zeros((2, CHANNELS))
+        self.counters = np.zeros((2, CHANNELS), dtype=np.int32)
+        self.jumps = np.zeros(6, dtype=np.int64)
+        self.stuck = np.zeros(6, dtype=bool)
+        self.failing = False
+        self.stop_pressed = False
+        self._held = self.rig.counts()
+        self.past = np.zeros((parameters.boards.buffer + 2, 18))
+        self._delay = 0
+        self._inject = parameters.emulation.inject
+        wiring = parameters.emulation.wiring
+        self._outputs = (np.array(wiring.phase_board), np.array(wiring.phase_channel))
+        self._inputs = (np.array(wiring.encoder_board), np.array(wiring.encoder_channel))
+        self._count()
+
+    # -- the vendor's module -----------------------------------------------------------------------
+
+    def HIL(self, card_type: str, identifier: str) -> EmulatedCard:  # noqa: N802
+        """Open a board, as the vendor's class of that name does."""
+        identifiers = self.parameters.boards.identifier
+        if card_type != self.parameters.boards.type or identifier not in identifiers:
+            raise HILError(Code.NO_SUCH_BOARD, f'there is no board {card_type} {identifier}')
+        if self.failing:
+            raise HILError(Code.HARDWARE, 'the board does not answer')
+        if identifier in self.cards:
+            raise HILError(Code.BOARD_BUSY, f'board {identifier} is in use')
+        card = EmulatedCard(self, identifiers.index(identifier), identifier)
+        self.cards[identifier] = card
+        return card
+
+    HIL.INFINITE = 2**32 - 1  # type: ignore[attr-defined]
+
+    # -- the world ---------------------------------------------------------------------------------
+
+    def now(self) -> float:
+        """The boards' time in lockstep, the machine's in real time [s]."""
+        return self._clock() if self.realtime else self.ticks * self.period
+
+    def tick(self) -> None:
+        """One sample passes."""
+        self._inject_faults()
+        self.rig.advance(self.volts[self._outputs])
+        self.ticks += 1
+        row = self.past[self.ticks % len(self.past)]
+        row[:10], row[10:] = self.rig.state, self.rig.stage.command
+        self._count()
+        for card in self.cards.values():
+            card.on_tick()
+
+    def catch_up(self) -> None:
+        """In real time, let pass what has passed."""
+        if self.realtime:
+            due = int((self._clock() - self._started) / self.period)
+            while self.ticks < due:
+                self.tick()
+
+    def wait(self) -> None:
+        """Let the next sample pass: at once, or by the clock."""
+        if not self.realtime:
+            late, self._delay = self._delay, 0
+            for _ in range(1 + late):
+                self.tick()
+            return
+        self.catch_up()
+        ahead = self._started + (self.ticks + 1) * self.period - self._clock()
+        if ahead > 0.0:
+            self._sleep(ahead)
+        self.catch_up()
+
+    def dead(self, phase: int) -> None:
+        """No current flows in a phase (0..11) any more."""
+        self.rig.arrays.gain[phase] = 0.0
+
+    def delay(self, samples: int) -> None:
+        """The bridge reads its next sample this late."""
+        if self.realtime:
+            self._sleep(samples * self.period)
+        else:
+            self._delay = samples
+
+    def expire(self) -> None:
+        """The boards' watchdogs expire."""
+        for card in self.cards.values():
+            card.expire()
+
+    def _inject_faults(self) -> None:
+        inject = self._inject
+        if self.ticks != inject.sample:
+            return
+        if inject.dead_phase >= 0:
+            self.dead(inject.dead_phase)
+        if inject.stuck_encoder >= 0:
+            self.stuck[inject.stuck_encoder] = True
+        if inject.jumping_encoder >= 0:
+            self.jumps[inject.jumping_encoder] += inject.jump
+        if inject.late:
+            self.delay(inject.late)
+        self.failing = self.failing or inject.error
+        self.stop_pressed = self.stop_pressed or inject.stop_input
+        if inject.expired_watchdog:
+            self.expire()
+
+    def _count(self) -> None:
+        counts = self.rig.counts() + self.jumps
+        np.copyto(counts, self._held, where=self.stuck)
+        self._held = counts
+        self.counters[self._inputs] = counts.astype(np.int32)

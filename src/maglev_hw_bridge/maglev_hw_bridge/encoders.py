@@ -1,0 +1,112 @@
+"""From the boards' 32-bit counts to lengths, and homing."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.signal_parameters import ENCODER_NAMES
+from maglev_plant.compiled import compiled
+
+FloatArray = NDArray[np.float64]
+CountArray = NDArray[np.int32]
+
+_HALF = 2**31
+
+
+class HomingError(RuntimeError):
+    """Homing was refused; the message says why and what to do."""
+
+
+class EncoderArrays(NamedTuple):
+    """What :func:`decode` takes; six encoders: the gaps of motors 1..4, x, z."""
+
+    scale: FloatArray  # (6,) [m/count], with the direction's sign
+    zero: FloatArray  # (6,) length at total 0 [m]
+    last: CountArray  # (6,) the counts decoded last
+    total: NDArray[np.int64]  # (6,) counts without roll-over
+    length: FloatArray  # (6,) [m], the result
+
+
+@compiled
+def decode(arrays: EncoderArrays, counts: CountArray) -> None:
+    """Follow ``counts`` (6,) over roll-overs of the 32-bit counters and write ``length`` [m]."""
+    for i in range(6):
+        step = np.int64(counts[i]) - np.int64(arrays.last[i])
+        if step >= _HALF:
+            step -= 2 * _HALF
+        elif step < -_HALF:
+            step += 2 * _HALF
+        arrays.last[i] = counts[i]
+        arrays.total[i] += step
+        arrays.length[i] = arrays.zero[i] + arrays.scale[i] * arrays.total[i]
+
+
+class Encoders:
+    """Six incremental encoders; :attr:`arrays` serve compiled code."""
+
+    def __init__(self, parameters: BridgeParameters) -> None:
+        encoder = parameters.encoder
+        self._homing = parameters.homing
+        self._rest = parameters.machine.gap_max
+        self.homed = False
+        self.arrays = EncoderArrays(
+            scale=np.array(encoder.resolution) * np.array(encoder.direction),
+            zero=np.array(encoder.zero),
+            last=np.zeros(6, dtype=np.int32),
+            total=np.zeros(6, dtype=np.int64),
+            length=np.zeros(6),
+        )
+
+    def start(self, counts: CountArray) -> None:
+        """Take ``counts`` (6,) as they are for the totals; call before the first decoding."""
+        self.arrays.last[:] = counts
+        self.arrays.total[:] = counts
+        decode(self.arrays, counts)
+
+    def decode(self, counts: CountArray) -> FloatArray:
+        """Lengths [m] of gaps 1..4, x, z, shape (6,); the same array at each call."""
+        decode(self.arrays, counts)
+        return self.arrays.length
+
+    def home(self, readings: NDArray[np.int32]) -> FloatArray:
+        """Define the zeros from readings (n, 6) of a platen at rest in its home position.
+
+        The four gaps are then at the lower stop, x and z where ``homing`` says. Returns by how
+        much each zero moved [m], shape (6,). Raises :class:`HomingError`, and changes nothing, when
+        the platen is not at rest or when an earlier homing was elsewhere.
+        """
+        turns = readings.astype(np.int64) - readings[0].astype(np.int64)
+        turns = (turns + _HALF) % (2 * _HALF) - _HALF
+        spread = np.ptp(turns, axis=0) * np.abs(self.arrays.scale)
+        worst = int(np.argmax(spread))
+        if spread[worst] > self._homing.spread:
+            raise HomingError(
+                f'the platen is not at rest: encoder {ENCODER_NAMES[worst]} moves by '
+                f'{spread[worst] * 1e6:.0f} um; let it settle, then home again'
+            )
+        home = np.array([self._rest] * 4 + [self._homing.x, self._homing.z])
+        total = readings[-1].astype(np.int64)
+        zero = home - self.arrays.scale * total
+        here = self.arrays.zero + self.arrays.scale * self._total_at(readings[-1])
+        shift = home - here
+        worst = int(np.argmax(np.abs(shift)))
+        if self.homed and abs(shift[worst]) > self._homing.shift:
+            raise HomingError(
+                f'encoder {ENCODER_NAMES[worst]} reads {here[worst] * 1e3:.3f} mm where home is '
+                f'{home[worst] * 1e3:.3f} mm: put the platen on its lower stop at x = '
+                f'{self._homing.x * 1e3:g} mm, z = {self._homing.z * 1e3:g} mm; if it is there, '
+                'the encoder lost counts: check its cable, then configure anew'
+            )
+        self.arrays.zero[:] = zero
+        self.homed = True
+        self.start(readings[-1])
+        return shift
+
+    def _total_at(self, counts: CountArray) -> NDArray[np.int64]:
+        step = counts.astype(np.int64) - self.arrays.last.astype(np.int64)
+        total: NDArray[np.int64] = self.arrays.total + (step + _HALF) % (2 * _HALF) - _HALF
+        return total

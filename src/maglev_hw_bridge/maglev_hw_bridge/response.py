@@ -1,0 +1,126 @@
+"""What each phase alone moves: the pulses of commissioning, on the machine and on a twin of it.
+
+One phase at a time gets a slowly rising current, one way and the other, until an encoder has seen
+enough. With the wiring that the parameters claim, the emulated machine foretells every encoder's
+answer; which single error would explain what was seen instead is found in
+:mod:`maglev_hw_bridge.diagnosis`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maglev_hw_bridge.amplifiers import Amplifiers
+from maglev_hw_bridge.drivers import Driver
+from maglev_hw_bridge.drivers.emulated import EmulatedBoards
+from maglev_hw_bridge.drivers.quanser import QuanserDriver
+from maglev_hw_bridge.encoders import Encoders
+from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.signal_parameters import PHASES
+
+FloatArray = NDArray[np.float64]
+
+_RISE = 0.1  # to the peak current [s]
+_GAP_ENOUGH = 3e-4  # [m]
+_HORIZONTAL_ENOUGH = 4e-3  # [m]
+_QUIET = 0.05  # without a count, then the platen rests [s]
+_LONGEST_WAIT = 3.0  # for that [s]
+
+
+class Pulses:
+    """Pulses on one set of boards; the driver must be open, and is started and stopped here."""
+
+    def __init__(
+        self, parameters: BridgeParameters, driver: Driver, encoders: Encoders, peak: float
+    ) -> None:
+        """``peak``: largest phase current [A]."""
+        self._driver, self._encoders = driver, encoders
+        self._amplifiers = Amplifiers(parameters)
+        self._period = parameters.sample_time
+        self._peak = peak
+        self._counts = np.zeros(6, dtype=np.int32)
+        self._current = np.zeros(PHASES)
+
+    def phase(self, phase: int) -> FloatArray:
+        """What the encoders saw of one phase's current, (2, 6) [m]: positive, then negative.
+
+        Raises DriverError.
+        """
+        self._driver.start()
+        try:
+            self._sample()
+            return np.array([self._pulse(phase, sign) for sign in (1.0, -1.0)])
+        finally:
+            self._current[:] = 0.0
+            self._driver.stop()
+
+    def _sample(self) -> FloatArray:
+        self._driver.write(self._amplifiers.drive_phases(self._current))
+        self._driver.read(self._counts)
+        return self._encoders.decode(self._counts)
+
+    def _pulse(self, phase: int, sign: float) -> FloatArray:
+        start = self._sample().copy()
+        steps = round(_RISE / self._period)
+        moved = np.zeros(6)
+        for n in range(1, steps + 1):
+            self._current[phase] = sign * self._peak * n / steps
+            moved = self._sample() - start
+            gap, horizontal = np.max(np.abs(moved[:4])), np.max(np.abs(moved[4:]))
+            if gap > _GAP_ENOUGH or horizontal > _HORIZONTAL_ENOUGH:
+                break
+        self._current[:] = 0.0
+        self._settle()
+        return moved
+
+    def _settle(self) -> None:
+        """Wait without current until no encoder counts any more."""
+        last, quiet = self._sample().copy(), 0.0
+        for _ in range(round(_LONGEST_WAIT / self._period)):
+            now = self._sample()
+            quiet = quiet + self._period if np.array_equal(now, last) else 0.0
+            last[:] = now
+            if quiet >= _QUIET:
+                return
+
+    @property
+    def place(self) -> FloatArray:
+        """Where the platen stands, as the encoders have it: x, z [m]."""
+        return np.array(self._encoders.arrays.length[4:])
+
+
+class Twin:
+    """The emulated machine, wired as the parameters claim."""
+
+    def __init__(self, parameters: BridgeParameters, peak: float) -> None:
+        amplifier, encoder = parameters.amplifier, parameters.encoder
+        wiring = dataclasses.replace(
+            parameters.emulation.wiring,
+            phase_board=amplifier.board,
+            phase_channel=amplifier.channel,
+            phase_sign=amplifier.sign,
+            gain=amplifier.gain,
+            offset=amplifier.offset,
+            angle=parameters.commutation.offset,
+            encoder_board=encoder.board,
+            encoder_channel=encoder.channel,
+            encoder_direction=encoder.direction,
+        )
+        inject = dataclasses.replace(parameters.emulation.inject, sample=-1)
+        emulation = dataclasses.replace(parameters.emulation, wiring=wiring, inject=inject)
+        twin = dataclasses.replace(parameters, emulation=emulation)
+        self._boards = EmulatedBoards(twin)
+        driver = QuanserDriver(twin, self._boards, self._boards.now)
+        driver.open()
+        self._rest = parameters.machine.gap_max
+        self._pulses = Pulses(twin, driver, Encoders(twin), peak)
+
+    def phase(self, phase: int, place: FloatArray) -> FloatArray:
+        """What the encoders should see of one phase, (2, 6) [m], from ``place``: x, z [m]."""
+        self._boards.rig.place(np.array([self._rest, place[0], place[1], 0.0, 0.0]))
+        self._boards.rig.arrays.current[:] = 0.0
+        self._boards.tick()
+        return self._pulses.phase(phase)

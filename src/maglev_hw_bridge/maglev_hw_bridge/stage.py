@@ -1,0 +1,424 @@
+"""The real stage behind the stage contract: encoders, commutation, amplifiers, boards and faults.
+
+While encoders, boards and amplifiers are sound every fault ends in a landing that the bridge makes
+by itself; only when they are not, the current is cut. Either is latched until :meth:`reset`.
+"""
+
+from __future__ import annotations
+
+import enum
+import time
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maglev_hw_bridge import amplifiers, guard
+from maglev_hw_bridge.amplifiers import Amplifiers
+from maglev_hw_bridge.drivers import Driver, DriverError, WatchdogError, make_driver
+from maglev_hw_bridge.encoders import Encoders, HomingError
+from maglev_hw_bridge.faults import Fault, command_fault, encoder_fault, range_fault
+from maglev_hw_bridge.guard import Guard
+from maglev_hw_bridge.landing import Landing, impact_of_cut
+from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.signal_parameters import ENCODER_NAMES
+from maglev_node.stage import EncoderSample, StageError
+
+FloatArray = NDArray[np.float64]
+
+_DOUBT = 5e-4  # how far beyond the stops an encoder may read before it is disbelieved [m]
+_ON_THE_STOP = 2e-4  # this near the lower stop the platen rests [m]
+
+
+class Mode(enum.Enum):
+    """What the bridge does."""
+
+    CLOSED = 'closed'
+    READY = 'boards open, outputs at 0 V'
+    FOLLOWING = 'following the controller'
+    LANDING = 'landing by itself'
+    DISABLED = 'no current'
+    LOST = 'the boards are lost'
+
+
+class BridgeStage:
+    """The stage on boards, one sample per :meth:`read`; needs no ROS.
+
+    :meth:`configure`, :meth:`activate`; then per sample :meth:`read` and one of :meth:`write` and
+    :meth:`hold`; :meth:`land` and go on until ``mode`` is DISABLED, :meth:`deactivate`,
+    :meth:`close`. :attr:`fault` is what is latched.
+    """
+
+    def __init__(
+        self,
+        parameters: BridgeParameters | None = None,
+        *,
+        realtime: bool = False,
+        driver: Driver | None = None,
+    ) -> None:
+        """Raises StageError when the driver is not there, ParameterError when there is none."""
+        self.parameters = parameters or BridgeParameters()
+        self.realtime = realtime
+        self.mode = Mode.CLOSED
+        self.fault: Fault | None = None
+        self.why = ''
+        self.late_ticks = 0
+        try:
+            self.driver = driver or make_driver(self.parameters, realtime)
+        except DriverError as error:
+            raise StageError(str(error)) from error
+        self.encoders = Encoders(self.parameters)
+        self.amplifiers = Amplifiers(self.parameters)
+        self.guard = Guard(self.parameters)
+        self.landing = Landing(self.parameters)
+        self._counts = np.zeros(6, dtype=np.int32)
+        self._zero = np.zeros(4)
+        self._direct, self._quadrature = np.zeros(4), np.zeros(4)
+        self._flying = False
+        self._age = 0  # samples since the last fresh currents
+        self._lower_stop = self.parameters.machine.gap_max
+        self._stale_samples = round(self.parameters.fault.stale / self.parameters.sample_time)
+        self._warm_up()
+
+    def _warm_up(self) -> None:
+        """Compile, or load what was compiled, before a sample asks for it."""
+        y = self._lower_stop
+        self.guard.watch(np.array([y, y, y, y, 0.0, 0.0]), True)
+        self.landing.begin(self.guard.arrays.position, self._zero_rate())
+        self.landing.step(self.guard.arrays.position, self._zero_rate())
+        self.encoders.decode(self._counts)
+        self.amplifiers.drive(self._zero, self._zero, 0.0, 0.0)
+        impact_of_cut(self.parameters, y - 1e-4, 0.0)
+        self.guard.forget()
+
+    @staticmethod
+    def _zero_rate() -> FloatArray:
+        return np.zeros(5)
+
+    # -- states ------------------------------------------------------------------------------------
+
+    def configure(self) -> None:
+        """Open and check the boards, read the encoders, home when that is wanted at the start."""
+        try:
+            self.driver.open()
+            self.driver.counts(self._counts)
+        except DriverError as error:
+            self.driver.close()
+            raise StageError(str(error)) from error
+        self.encoders.start(self._counts)
+        self.mode = Mode.READY
+        if self.parameters.homing.at_start:
+            try:
+                self.home()
+            except HomingError as error:
+                self.close()
+                raise StageError(f'homing refused: {error}') from error
+
+    def activate(self) -> None:
+        """Arm the watchdog and enable the amplifiers at zero current. Raises StageError."""
+        if self.mode is not Mode.READY:
+            raise StageError(f'cannot be activated: {self.mode.value}')
+        self._check_encoders()
+        try:
+            self.driver.start()
+        except DriverError as error:
+            self._drop_boards()
+            raise StageError(str(error)) from error
+        self.amplifiers.cut()
+        self.guard.forget()
+        self._flying, self._age = False, 0
+        self.mode = Mode.FOLLOWING if self.fault is None else Mode.DISABLED
+
+    def _check_encoders(self) -> None:
+        """Refuse encoders that read what the stops do not let the platen be."""
+        self._peek(self._counts)
+        length = self.encoders.decode(self._counts)
+        machine = self.parameters.machine
+        gap = self.parameters.fault
+        lower = np.array([gap.gap_lower] * 4 + [-machine.x_max, -machine.z_max])
+        upper = np.array([gap.gap_upper] * 4 + [machine.x_max, machine.z_max])
+        wrong = np.flatnonzero((length < lower - _DOUBT) | (length > upper + _DOUBT))
+        if len(wrong):
+            name, value = ENCODER_NAMES[wrong[0]], length[wrong[0]]
+            raise StageError(
+                f'encoder {name} reads {value * 1e3:.2f} mm, beyond the stops: home first (~/home)'
+            )
+
+    def deactivate(self) -> None:
+        """Disable the amplifiers and the watchdog; :meth:`land` first. Raises StageError."""
+        if self.mode not in (Mode.FOLLOWING, Mode.LANDING, Mode.DISABLED):
+            return
+        self.amplifiers.cut()
+        self._flying = False
+        try:
+            self.driver.stop()
+        except DriverError as error:
+            self._drop_boards()
+            raise StageError(str(error)) from error
+        self.mode = Mode.READY
+
+    def close(self) -> None:
+        """Release the boards with outputs at 0 V; may be called twice."""
+        self._flying = False
+        if self.mode is not Mode.CLOSED:
+            self.mode = Mode.CLOSED
+            self.amplifiers.cut()
+            self.driver.close()
+
+    def home(self) -> FloatArray:
+        """Define the encoders' zeros: the platen rests at its home position.
+
+        Returns by how much each zero moved (6,) [m]. Raises HomingError, StageError.
+        """
+        if self.mode is not Mode.READY:
+            raise HomingError(f'the boards must be open and the stage inactive: {self.mode.value}')
+        readings = np.zeros((self.parameters.homing.samples, 6), dtype=np.int32)
+        for row in readings:
+            self._peek(row)
+            if self.realtime:
+                time.sleep(self.parameters.sample_time)
+        shift = self.encoders.home(readings)
+        self.guard.forget()
+        return shift
+
+    def _peek(self, counts: NDArray[np.int32]) -> None:
+        try:
+            self.driver.counts(counts)
+        except DriverError as error:
+            self._drop_boards()
+            raise StageError(str(error)) from error
+
+    # -- samples -----------------------------------------------------------------------------------
+
+    @property
+    def flying(self) -> bool:
+        """Whether current flows."""
+        return self._flying
+
+    def read(self) -> EncoderSample:
+        """The next sample; waits for the boards' clock. Raises StageError when they are lost."""
+        if self.mode in (Mode.CLOSED, Mode.READY, Mode.LOST):
+            raise StageError(f'no sample: {self.mode.value}')
+        try:
+            self.driver.read(self._counts)
+        except DriverError as error:
+            raise self._lose_boards(error) from error
+        length = self.encoders.decode(self._counts)
+        code, index = self.guard.watch(length, self._flying)
+        if code != guard.FINE:
+            self._sensing_fault(code, index)
+        if self.driver.stop_pressed:
+            self._raise_fault('stop', 'the emergency stop is pressed', 'release it')
+        if self.driver.late > 0.5 * self.parameters.sample_time:
+            self._late()
+        return EncoderSample(length[:4].copy(), length.item(4), length.item(5))
+
+    def write(self, direct_current: Any, quadrature_current: Any) -> None:
+        """Currents of motors 1..4 [A], (4,) each, fresh from the controller.
+
+        Raises ValueError when a shape is wrong or a current is not finite or too large (the bridge
+        then lands), StageError when the boards are lost.
+        """
+        i_d, i_q = _four(direct_current), _four(quadrature_current)
+        self._age = 0
+        refused = ''
+        if self.mode is Mode.FOLLOWING:
+            refused = self._follow(i_d, i_q)
+        elif not (np.all(np.isfinite(i_d)) and np.all(np.isfinite(i_q))):
+            refused = 'currents must be finite'
+        self._put_out()
+        if refused:
+            raise ValueError(refused)
+
+    def hold(self) -> None:
+        """No fresh currents for this sample: the last ones stay, for a while. Raises StageError."""
+        self._age += 1
+        if self.mode is Mode.FOLLOWING:
+            if self._flying and self._age >= self._stale_samples:
+                period = self.parameters.sample_time
+                self._raise_fault(
+                    'stale',
+                    f'no fresh currents for {self._age * period * 1e3:.0f} ms',
+                    'start the controller again',
+                )
+            else:
+                self._follow(self._direct, self._quadrature)
+        self._put_out()
+
+    def _follow(self, i_d: FloatArray, i_q: FloatArray) -> str:
+        """Drive the amplifiers as commanded; returns why a command was refused."""
+        x, z = self.encoders.arrays.length[4], self.encoders.arrays.length[5]
+        code, index = self.amplifiers.drive(i_d, i_q, x, z)
+        if code in (amplifiers.FINE, amplifiers.SPENT):
+            self._direct[:], self._quadrature[:] = i_d, i_q
+            self.guard.arrays.i_q[:] = i_q
+            self._flying = bool(np.any(i_d) or np.any(i_q))
+        if code == amplifiers.FINE:
+            return ''
+        reason, remedy = command_fault(code, index, i_d, i_q, self.amplifiers)
+        self._raise_fault('current', reason, remedy)
+        return '' if code == amplifiers.SPENT else reason
+
+    def _put_out(self) -> None:
+        if self.mode is Mode.LANDING:
+            self._descend()
+        if self.mode in (Mode.FOLLOWING, Mode.LANDING, Mode.DISABLED):
+            if self.mode is Mode.DISABLED:
+                self.amplifiers.drive(self._zero, self._zero, 0.0, 0.0)
+            try:
+                self.driver.write(self.amplifiers.volts)
+            except DriverError as error:
+                raise self._lose_boards(error) from error
+
+    def _descend(self) -> None:
+        state = self.guard.arrays
+        if self.landing.step(state.position, state.rate):
+            self._disable()
+            return
+        x, z = self.encoders.arrays.length[4], self.encoders.arrays.length[5]
+        i_d, i_q = self.landing.direct_current, self.landing.quadrature_current
+        code, _ = self.amplifiers.drive(i_d, i_q, x, z)
+        state.i_q[:] = i_q
+        if code not in (amplifiers.FINE, amplifiers.SPENT):
+            self._disable()
+
+    # -- faults ------------------------------------------------------------------------------------
+
+    def land(self, why: str) -> None:
+        """Land without a fault; the mode is DISABLED when it is done."""
+        if self.mode is Mode.FOLLOWING:
+            self.why = why
+            self._begin_landing()
+
+    def stop(self) -> None:
+        """The emergency stop: lands while everything needed for that is sound."""
+        self._raise_fault('stop', 'emergency stop', 'see to what made it necessary')
+
+    def resume(self) -> None:
+        """Follow the controller again after a landing without a fault."""
+        if self.mode is Mode.DISABLED and self.fault is None:
+            self.mode, self.why, self._age = Mode.FOLLOWING, '', 0
+
+    def reset(self) -> tuple[bool, str]:
+        """Clear the latched fault if its cause is gone; whether it was, and what to know."""
+        if self.fault is None:
+            resumed = self.mode is Mode.DISABLED
+            self.resume()
+            return resumed, 'follows the controller again' if resumed else 'there is no fault'
+        if self.mode is Mode.LANDING:
+            return False, 'still landing: reset when the platen rests'
+        remaining = self._restart() if self.mode is Mode.LOST else self._remaining()
+        if remaining:
+            return False, f'the cause is still there: {remaining}'
+        cleared, self.fault = self.fault, None
+        self._direct[:] = self._quadrature[:] = 0.0
+        self.guard.forget()
+        self.resume()
+        return True, f'cleared: {cleared.reason}'
+
+    def _remaining(self) -> str:
+        """What still speaks against clearing the fault."""
+        if self.driver.stop_pressed:
+            return 'the emergency stop is pressed'
+        if abs(self.guard.residual) > self.parameters.fault.residual:
+            return f'g1 + g3 - g2 - g4 is {self.guard.residual * 1e6:.0f} um: home again'
+        if self.amplifiers.load > self.parameters.amplifier.derate_load:
+            return f'the amplifiers are hot, I2t load {self.amplifiers.load:.2f}: let them cool'
+        return ''
+
+    def _restart(self) -> str:
+        """Bring lost boards back: closed, opened, checked, started; what went wrong."""
+        self.driver.close()
+        self.mode = Mode.CLOSED
+        homed, total = self.encoders.homed, self.encoders.arrays.total.copy()
+        try:
+            self.driver.open()
+            self.driver.counts(self._counts)
+            self.encoders.decode(self._counts)
+            self.mode = Mode.READY
+            self.activate()
+        except (DriverError, StageError) as error:
+            self.driver.close()
+            self.mode = Mode.LOST
+            return str(error)
+        self.encoders.homed = homed and bool(np.any(self.encoders.arrays.total) or not total.any())
+        return ''
+
+    def _raise_fault(self, kind: str, reason: str, remedy: str, cut: bool = False) -> None:
+        if self.fault is not None and not (cut and self.mode is Mode.LANDING):
+            return
+        if cut and self._flying:
+            reason += self._consequence()
+        self.fault = Fault(kind, reason, remedy, cut)
+        self.why = kind
+        if cut:
+            self._disable()
+        elif self.mode is Mode.FOLLOWING:
+            self._begin_landing()
+
+    def _consequence(self) -> str:
+        state = self.guard.arrays
+        speed, stop = impact_of_cut(self.parameters, state.position[0], state.rate[0])
+        return f'; the platen strikes the {stop} stop at about {speed:.2f} m/s'
+
+    def _begin_landing(self) -> None:
+        state = self.guard.arrays
+        resting = state.position[0] > self._lower_stop - _ON_THE_STOP
+        if not self._flying or (resting and abs(state.rate[0]) < 0.02):
+            self._disable()
+            return
+        self.mode = Mode.LANDING
+        self.landing.begin(state.position, state.rate)
+
+    def _disable(self) -> None:
+        self.mode = Mode.DISABLED
+        self._flying = False
+        self._direct[:] = self._quadrature[:] = 0.0
+        self.amplifiers.cut()
+
+    def _sensing_fault(self, code: int, index: int) -> None:
+        if code in (guard.RANGE, guard.GAP_RANGE):
+            if self.mode is Mode.LANDING:  # is on its way out of there
+                return
+            self._raise_fault('range', *range_fault(code, index, self.guard))
+        else:
+            self._raise_fault('encoder', *encoder_fault(code, index, self.guard), cut=True)
+
+    def _late(self) -> None:
+        self.late_ticks += 1
+        if self._flying and self.driver.late > self.parameters.boards.overrun:
+            self._raise_fault(
+                'overrun',
+                f'a sample was read {self.driver.late * 1e3:.1f} ms late',
+                'free the machine of other load',
+            )
+
+    def _lose_boards(self, error: DriverError) -> StageError:
+        kind = 'watchdog' if isinstance(error, WatchdogError) else 'board'
+        self._raise_fault(kind, str(error), 'see to the boards', cut=True)
+        self._drop_boards()
+        return StageError(str(error))
+
+    def _drop_boards(self) -> None:
+        self.driver.close()
+        self.mode = Mode.LOST
+        self._flying = False
+
+
+def _four(value: Any) -> FloatArray:
+    if type(value) is np.ndarray and value.dtype == np.float64 and value.shape == (4,):
+        return value
+    array = np.ascontiguousarray(value, dtype=np.float64)
+    if array.shape != (4,):
+        raise ValueError(f'currents must have shape (4,), one per motor, not {array.shape}')
+    return array
+
+
+def open_stage(
+    parameters: BridgeParameters, *, realtime: bool = False, driver: Driver | None = None
+) -> BridgeStage:
+    """A stage that is configured and active. Raises StageError, ParameterError."""
+    stage = BridgeStage(parameters, realtime=realtime, driver=driver)
+    stage.configure()
+    stage.activate()
+    return stage

@@ -1,0 +1,26 @@
+"""Fixtures of the tests that start real nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from graph import Nodes, Observer
+
+
+@pytest.fixture
+def nodes(tmp_path: Path) -> Iterator[Nodes]:
+    """Start nodes that end with the test."""
+    started = Nodes(tmp_path)
+    yield started
+    for process in started.started:
+        process.kill()
+
+
+@pytest.fixture
+def observer() -> Iterator[Observer]:
+    """A node that watches the graph."""
+    watching = Observer()
+    yield watching
+    watching.close()

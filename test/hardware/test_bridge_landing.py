@@ -1,0 +1,91 @@
+"""Landing and cutting: the speed at the stop, from several heights and from the ellipse."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from bridge_flight import OMEGA, Flight, ellipse, hover
+
+from maglev_hw_bridge.landing import impact_of_cut
+from maglev_hw_bridge.stage import Mode
+
+SOFT = 0.05  # [m/s]
+HEIGHTS = [0.0185, 0.020, 0.0225, 0.025, 0.0285, 0.030, 0.0308]
+MOMENTS = [0.0, 0.2, 0.333, 0.7, 0.92, 1.1]  # on the ellipse; z is fastest at 0, x a quarter on
+
+
+def fly(target: object, samples: int, **overrides: object) -> Flight:
+    flight = Flight(target, overrides)  # type: ignore[arg-type]
+    flight.run(samples)
+    assert flight.stage.fault is None
+    flight.rig.forget_impact()
+    return flight
+
+
+def impact_when_cut(flight: Flight) -> float:
+    flight.stage.deactivate()
+    for _ in range(2000):
+        flight.boards.tick()
+    return flight.rig.impact
+
+
+@pytest.mark.parametrize('y', HEIGHTS)
+def test_landed_softly_from_any_height(y: float) -> None:
+    flight = fly(hover(y), 250)
+    flight.stage.land('test')
+    flight.until_no_current()
+    assert flight.stage.fault is None
+    assert flight.rig.impact <= SOFT
+    assert flight.rig.state[0] == 0.031
+
+
+@pytest.mark.parametrize('moment', MOMENTS)
+def test_landed_softly_from_the_ellipse_at_full_speed(moment: float) -> None:
+    flight = fly(lambda t: ellipse(t + moment), 250)
+    flight.stage.land('test')
+    nearest = 1.0
+    while flight.stage.mode is Mode.LANDING:
+        flight.step(controlled=False)
+        nearest = min(nearest, float(np.min(flight.stage.encoders.arrays.length[:4])))
+    assert nearest > 0.018
+    flight.until_no_current()
+    assert flight.stage.fault is None
+    assert flight.rig.impact <= SOFT
+    assert np.max(np.abs(flight.rig.state[[2, 4]])) < 0.045
+    assert flight.tilt < 1e-4
+
+
+@pytest.mark.parametrize('offset', [{'K_v1': 0.93}, {'K_v1': 1.07}, {'mass_y': 1.1}])
+def test_landed_softly_though_the_machine_is_not_as_known(offset: dict[str, float]) -> None:
+    overrides = {f'emulation.offset.{name}': value for name, value in offset.items()}
+    flight = fly(hover(0.022), 600, **overrides)
+    flight.stage.land('test')
+    flight.until_no_current()
+    assert flight.rig.impact <= SOFT
+
+
+@pytest.mark.parametrize('y', [0.0185, 0.020, 0.025, 0.0285, 0.030])
+def test_a_cut_strikes_the_stop_as_foretold(y: float) -> None:
+    free = {'emulation.guide.coulomb': [0.0] * 5, 'emulation.guide.viscous': [0.0] * 5}
+    flight = fly(hover(y), 400, **free)
+    state = flight.rig.state
+    foretold, stop = impact_of_cut(flight.stage.parameters, state[0], state[1])
+    struck = impact_when_cut(flight)
+    assert stop == ('upper' if y < 0.0287 else 'lower')
+    assert struck == pytest.approx(foretold, rel=0.12, abs=0.01)
+    if y < 0.028:
+        assert struck > SOFT  # a cut is no landing
+
+
+def test_a_cut_on_the_ellipse_is_far_from_soft() -> None:
+    flight = fly(ellipse, round(1000 * 0.25 * 2 * np.pi / OMEGA))
+    assert impact_when_cut(flight) > 4 * SOFT
+
+
+def test_landing_on_the_ground_ends_at_once() -> None:
+    flight = Flight(hover(0.031))
+    flight.step()
+    flight.stage.land('test')
+    assert flight.stage.mode is Mode.DISABLED
+    flight.stage.resume()
+    assert flight.stage.mode is Mode.FOLLOWING

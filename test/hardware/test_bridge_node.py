@@ -1,0 +1,205 @@
+"""The bridge as a node: the same contract as the plant's, managed, and faults on a real graph."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from graph import Nodes, Observer, Process
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+
+from maglev_msgs.msg import Currents
+from maglev_node.topics import (
+    CONTROLLER_STATE,
+    CURRENTS,
+    MEASUREMENT,
+    REFERENCE,
+    TRUE_STATE,
+    sample_qos,
+)
+
+pytestmark = pytest.mark.graph
+
+LOWER_STOP = 0.031
+FILES = {'plant': ('benchmark.yaml',), 'hw_bridge': ('hw_bridge.yaml',)}
+ELLIPSE = 'scenario_ellipse.yaml'
+
+
+class Life:
+    """The life-cycle services of a node, and what it says on /diagnostics."""
+
+    def __init__(self, observer: Observer, name: str) -> None:
+        self._observer, self._name = observer, name
+        node = observer.node
+        self._change = node.create_client(ChangeState, f'/{name}/change_state')
+        self._get = node.create_client(GetState, f'/{name}/get_state')
+        self._said: list[DiagnosticStatus] = []
+        node.create_subscription(DiagnosticArray, '/diagnostics', self._hear, 10)
+
+    def _hear(self, message: DiagnosticArray) -> None:
+        self._said += [status for status in message.status if status.name == self._name]
+
+    def change(self, transition: int) -> bool:
+        request = ChangeState.Request()
+        request.transition.id = transition
+        return bool(self._observer.ask(self._change, request).success)
+
+    @property
+    def state(self) -> str:
+        return str(self._observer.ask(self._get, GetState.Request()).current_state.label)
+
+    def newest(self) -> DiagnosticStatus | None:
+        self._observer.serve(0.02)
+        return self._said[-1] if self._said else None
+
+    def fault(self) -> str:
+        status = self.newest()
+        return status.message if status and status.level == DiagnosticStatus.ERROR else ''
+
+
+def numbers(observer: Observer) -> list[int]:
+    return [message.sequence for message in observer.look()[MEASUREMENT]]
+
+
+def height(observer: Observer) -> float:
+    newest = observer.newest(MEASUREMENT)
+    return LOWER_STOP if newest is None else float(np.mean(newest.gap))
+
+
+def answer(observer: Observer) -> Callable[[int], None]:
+    """A controller of the test's own, that wants no current."""
+    publisher = observer.node.create_publisher(Currents, CURRENTS, sample_qos())
+
+    def publish(sequence: int) -> None:
+        publisher.publish(Currents(sequence=sequence))
+
+    return publish
+
+
+@pytest.mark.parametrize('stage', ['plant', 'hw_bridge'])
+def test_lockstep_as_every_stage(stage: str, nodes: Nodes, observer: Observer) -> None:
+    process = nodes.start(stage, 'first_sequence:=7', params=FILES[stage])
+    observer.watch(MEASUREMENT)
+    observer.wait(lambda: len(numbers(observer)) > 3)
+    assert set(numbers(observer)) == {7}
+    publish = answer(observer)
+    while (newest := max(numbers(observer))) < 30:
+        publish(newest)
+        observer.serve(0.01)
+    seen = numbers(observer)
+    assert sorted(set(seen)) == list(range(7, 31))
+    assert seen == sorted(seen)
+    process.signal(signal.SIGTERM)
+    assert process.wait() == 143
+
+
+@pytest.mark.parametrize('stage', ['plant', 'hw_bridge'])
+def test_a_managed_node(stage: str, nodes: Nodes, observer: Observer) -> None:
+    process = nodes.start(stage, 'autostart:=false', params=FILES[stage])
+    observer.watch(MEASUREMENT)
+    life = Life(observer, stage)
+    assert life.state == 'unconfigured'
+    assert life.change(Transition.TRANSITION_CONFIGURE)
+    assert life.state == 'inactive'
+    assert numbers(observer) == []
+    assert life.change(Transition.TRANSITION_ACTIVATE)
+    observer.wait(lambda: bool(numbers(observer)))
+    assert life.change(Transition.TRANSITION_DEACTIVATE)
+    assert life.state == 'inactive'
+    assert life.change(Transition.TRANSITION_ACTIVATE)
+    assert life.change(Transition.TRANSITION_DEACTIVATE)
+    assert life.change(Transition.TRANSITION_CLEANUP)
+    assert life.state == 'unconfigured'
+    assert life.change(Transition.TRANSITION_CONFIGURE)
+    assert life.change(Transition.TRANSITION_INACTIVE_SHUTDOWN)
+    assert process.wait() == 0, process.output
+
+
+def test_unhomed_it_is_not_activated(nodes: Nodes, observer: Observer) -> None:
+    process = nodes.start('hw_bridge', 'autostart:=false', 'homing.x:=0.0', 'homing.z:=0.0')
+    life = Life(observer, 'hw_bridge')
+    assert not observer.call('/hw_bridge/home').success
+    assert life.change(Transition.TRANSITION_CONFIGURE)
+    assert not life.change(Transition.TRANSITION_ACTIVATE)
+    assert 'home first' in process.output
+    assert life.state == 'inactive'
+    assert observer.call('/hw_bridge/home').success
+    assert life.change(Transition.TRANSITION_ACTIVATE)
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'text'),
+    [
+        (['driver:=quanser', 'mode:=realtime'], 'quanser.com'),
+        (['driver:=quanser'], 'realtime'),
+        (['driver:=oscilloscope'], 'one of emulated, quanser'),
+        (['boards.watchdogg:=0.02'], "did you mean 'boards.watchdog'"),
+        (['boards.watchdog:=20.0'], 'must lie in'),
+    ],
+)
+def test_bad_parameters_are_one_clear_line(arguments: list[str], text: str, nodes: Nodes) -> None:
+    process = nodes.start('hw_bridge', *arguments, params=FILES['hw_bridge'])
+    assert process.wait() == 1
+    assert text in process.output
+    assert 'Traceback' not in process.output
+
+
+def fly(nodes: Nodes, observer: Observer) -> dict[str, Process]:
+    """Bridge, controller and reference on the ellipse, until it is airborne."""
+    observer.watch(MEASUREMENT, REFERENCE, CURRENTS, CONTROLLER_STATE, TRUE_STATE)
+    watched = 'watchers:=1'  # by the test
+    graph = {
+        'stage': nodes.start(
+            'hw_bridge', watched, 'answer_timeout:=1.0', params=FILES['hw_bridge']
+        ),
+        'controller': nodes.start('controller', watched),
+        'reference': nodes.start('reference', watched, 'duration:=600.0', params=(ELLIPSE,)),
+    }
+    observer.wait(lambda: height(observer) < 0.026, timeout=60)
+    return graph
+
+
+def test_a_dead_controller(nodes: Nodes, observer: Observer) -> None:
+    graph = fly(nodes, observer)
+    life = Life(observer, 'hw_bridge')
+    graph['controller'].kill()
+    observer.wait(lambda: height(observer) > LOWER_STOP - 1e-5)
+    observer.wait(lambda: 'no fresh currents' in life.fault())
+    assert graph['stage'].running
+    assert graph['stage'].output.count('fault at sample') == 1
+    assert observer.call('/hw_bridge/reset').success
+    assert not observer.call('/hw_bridge/reset').success
+    graph['stage'].signal(signal.SIGINT)
+    assert graph['stage'].wait() == 130
+
+
+def test_an_emergency_stop_lands_and_stays(nodes: Nodes, observer: Observer) -> None:
+    graph = fly(nodes, observer)
+    life = Life(observer, 'hw_bridge')
+    assert observer.call('/hw_bridge/emergency_stop').success
+    observer.wait(lambda: height(observer) > LOWER_STOP - 1e-5)
+    observer.wait(lambda: 'emergency stop' in life.fault())
+    graph['reference'].kill()
+    observer.wait(lambda: observer.call('/hw_bridge/reset').success)
+    assert height(observer) > LOWER_STOP - 1e-5
+
+
+def test_deactivated_in_flight_it_lands_first(nodes: Nodes, observer: Observer) -> None:
+    graph = fly(nodes, observer)
+    life = Life(observer, 'hw_bridge')
+    assert life.change(Transition.TRANSITION_DEACTIVATE)
+    observer.wait(lambda: height(observer) > LOWER_STOP - 1e-5)
+    gaps = np.array([np.mean(message.gap) for message in observer.messages[MEASUREMENT]])
+    assert np.max(np.abs(np.diff(gaps[-2000:]))) < 5e-5  # 0.05 m/s
+    assert 'fault' not in graph['stage'].output
+
+
+def test_stopped_in_flight_it_lands_first(nodes: Nodes, observer: Observer) -> None:
+    graph = fly(nodes, observer)
+    graph['stage'].signal(signal.SIGINT)
+    assert graph['stage'].wait() == 130
+    observer.wait(lambda: height(observer) > LOWER_STOP - 1e-5)
