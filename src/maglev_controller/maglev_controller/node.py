@@ -74,9 +74,8 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         )
         self._queues = Queues(self)
         self._references = self._queues.subscribe(REFERENCE, Reference)
-        newest = sample_qos() if self._lockstep else sample_qos(depth=1)
         self._measurements = self.create_subscription(
-            Measurement, MEASUREMENT, self._on_measurement, newest
+            Measurement, MEASUREMENT, self._on_measurement, sample_qos()
         )
         self.create_service(SetBool, '~/enable', self._on_enable)
         self.create_service(Trigger, '~/emergency_stop', self._on_emergency_stop)
@@ -114,6 +113,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         if sequence < self._sequence:
             self.get_logger().warning('the stage began anew')
             self.supervisor.restart()
+            self._sequence, self._pending = -1, None
         elif sequence - self._sequence > self._longest_gap and self.supervisor.flying:
             self.supervisor.cut(f'{sequence - self._sequence - 1} measurements are missing')
         if self.supervisor.references.newest < sequence:

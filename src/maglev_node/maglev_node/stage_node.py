@@ -256,7 +256,8 @@ class StageNode(ManagedNode[Any]):
 
     def watched(self) -> bool:
         """Whether all who shall see every sample are there."""
-        listeners = self.parameters.watchers + 1  # and the controller
+        watchers = self.parameters.watchers
+        listeners = watchers + 2 if watchers else 1  # the controller, and the reference
         return bool(self._publisher.get_subscription_count() >= listeners)
 
     def publish_more(self) -> None:

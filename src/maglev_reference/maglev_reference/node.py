@@ -85,6 +85,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         self._origin = 0  # the stage's sequence at the timeline's sample 0
         self._next = 0  # the timeline's first sample not yet published
         self._newest = 0  # the stage's newest sequence
+        self._autostart = self.parameters.autostart
         self._phase = Phase.REST
         self._seen = self._reminded = time.monotonic()
         self._message = Reference()
@@ -103,6 +104,8 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
             measurement = message
         if measurement is not None:
             self._seen = time.monotonic()
+            if self._timeline is not None and measurement.sequence < self._newest:
+                self._begin_anew()
             self._newest = int(measurement.sequence)
         if self._timeline is None:
             self._wait(measurement)
@@ -135,14 +138,14 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
             rest = outputs(
                 measurement.gap, measurement.x, measurement.z, self.parameters.limits.radius
             )
-            self._timeline = Timeline(self.parameters, rest, self.parameters.autostart)
+            self._timeline = Timeline(self.parameters, rest, self._autostart)
         except UnreachableError as error:
             self.fail(str(error))
         except ValueError as error:
             self.fail(f'lift-off refused: {error}; check the encoders')
         else:
             self._origin = self._newest
-            start = 'starting' if self.parameters.autostart else 'resting until ~/lift_off'
+            start = 'starting' if self._autostart else 'resting until ~/lift_off'
             self.get_logger().info(f'{start} at sample {self._origin}')
 
     def _publish(self, timeline: Timeline) -> None:
@@ -179,13 +182,21 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         silent = time.monotonic() - self._seen
         if silent < self.parameters.timeout:
             return
-        if self._phase == Phase.END:
-            self.finish(0)
+        if self._phase in (Phase.REST, Phase.END):  # nothing flies: another stage may follow
+            if self._phase == Phase.END and self.parameters.exit_at_end:
+                self.finish(0)
             return
         who = 'the stage, or the controller it waits for, has stopped'
         if self._measurements.publisher_count() == 0:
             who = 'the stage is gone'
         self.fail(f'no measurement for {silent:.1f} s after sample {self._newest}: {who}')
+
+    def _begin_anew(self) -> None:
+        """Another stage has taken the place of one that stopped: wait for what is asked of it."""
+        if self._phase not in (Phase.REST, Phase.END):
+            self.fail('the stage began anew in flight')
+        self._timeline, self._next = None, 0
+        self._autostart, self._phase = False, Phase.REST
 
     def _lift_off(self, _request: Any, response: Any) -> Any:
         if self._timeline is None:

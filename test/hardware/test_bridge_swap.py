@@ -1,0 +1,53 @@
+"""Plant out, bridge in, under a controller and a reference that keep running."""
+
+from __future__ import annotations
+
+import signal
+
+import pytest
+from graph import Nodes, Observer
+
+from maglev_msgs.msg import Reference
+from maglev_node.topics import REFERENCE, SAMPLE_TOPICS, TRUE_STATE
+
+pytestmark = pytest.mark.graph
+
+
+def test_land_swap_lift_off(nodes: Nodes, observer: Observer) -> None:
+    observer.watch(*SAMPLE_TOPICS)
+
+    def airborne() -> bool:
+        newest = observer.newest(TRUE_STATE)
+        return newest is not None and newest.state[0] < 0.026
+
+    def over() -> bool:
+        return observer.newest(REFERENCE).phase == Reference.END
+
+    plant = nodes.start('plant', 'watchers:=1', params=('benchmark.yaml',))
+    controller = nodes.start('controller', 'watchers:=1')
+    reference = nodes.start(
+        'reference',
+        'watchers:=1',
+        'autostart:=false',
+        'duration:=600.0',
+        params=('scenario_ellipse.yaml',),
+    )
+    observer.wait(lambda: observer.newest(REFERENCE) is not None)
+    assert observer.call('/reference/lift_off').success
+    observer.wait(airborne)
+    assert observer.call('/reference/land').success
+    observer.wait(over)
+    plant.signal(signal.SIGTERM)
+    assert plant.wait() == 128 + signal.SIGTERM
+
+    count = len(observer.look()[TRUE_STATE])
+    bridge = nodes.start('hw_bridge', 'watchers:=1', params=('hw_bridge.yaml',))
+    observer.wait(lambda: len(observer.look()[TRUE_STATE]) > count + 200)
+    observer.wait(lambda: observer.newest(REFERENCE).phase == Reference.REST)
+    assert observer.call('/reference/lift_off').success
+    observer.wait(airborne)
+    assert observer.call('/reference/land').success
+    observer.wait(over)
+    assert observer.newest(TRUE_STATE).state[0] == pytest.approx(0.031, abs=1e-4)
+    for process in (controller, reference, bridge):
+        assert process.running, process.output
