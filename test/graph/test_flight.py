@@ -188,7 +188,9 @@ def test_a_second_one_is_refused(nodes: Nodes, watching: Observer, name: str) ->
     watching.wait(lambda: airborne(watching))
     second = nodes.start(name)
     assert second.wait() == 1
-    assert 'there is another' in second.output
+    # On a busy machine a second reference may see the platen in flight before it sees the first.
+    also = 'lift-off refused' if name == 'reference' else 'there is another'
+    assert 'there is another' in second.output or also in second.output
     assert all(process.running for process in graph.values())
 
 

@@ -111,6 +111,8 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
             self._currents_publisher.publish(self._currents)
             return
         if sequence < self._sequence:
+            if self.supervisor.flying and time.monotonic() - self._answered < _SILENCE:
+                return  # of a second stage, which will find the first and leave
             self.get_logger().warning('the stage began anew')
             self.supervisor.restart()
             self._sequence, self._pending = -1, None

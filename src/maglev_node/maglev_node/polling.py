@@ -31,7 +31,7 @@ class Queues:
         )
 
     def subscribe(
-        self, topic: str, message_type: type, *, depth: int = 4096, raw: bool = False
+        self, topic: str, message_type: type, *, depth: int = 16384, raw: bool = False
     ) -> PolledSubscription:
         """A queue of ``depth`` messages; ``raw`` gives them serialised, as bytes.
 

@@ -23,10 +23,10 @@ SAMPLE_TOPICS: dict[str, type] = {
 """The topics that carry one message a sample, with their types."""
 
 
-def sample_qos(depth: int = 4096) -> QoSProfile:
+def sample_qos(depth: int = 16384) -> QoSProfile:
     """Reliable, in order, nothing kept for late joiners: no sample may be lost or come twice.
 
-    ``depth`` samples, a second and more of lockstep, are kept for a reader that is busy.
+    ``depth`` samples, several seconds of lockstep, are kept for a reader that is busy.
     """
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
