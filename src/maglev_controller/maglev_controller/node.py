@@ -131,8 +131,9 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
     def _watched(self) -> bool:
         """Whether the stage, and all who shall see every sample, are there."""
         watchers = self.parameters.watchers
+        stage_and_reference = 2 if watchers and not self._lockstep else 1
         return bool(
-            self._currents_publisher.get_subscription_count() >= watchers + 1
+            self._currents_publisher.get_subscription_count() >= watchers + stage_and_reference
             and self._state_publisher.get_subscription_count() >= watchers
         )
 

@@ -130,8 +130,7 @@ class MaglevNode(Node, Generic[P]):
         try:
             for thread in os.listdir('/proc/self/task'):
                 scheduling = os.sched_param(parameters.realtime_priority)
-                policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
-                os.sched_setscheduler(int(thread), policy, scheduling)
+                os.sched_setscheduler(int(thread), os.SCHED_FIFO, scheduling)
         except OSError:
             self.get_logger().warning(
                 'real-time priority is not permitted (see ulimit -r): samples may come late'

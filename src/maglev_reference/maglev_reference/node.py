@@ -10,13 +10,13 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import Trigger
 
-from maglev_msgs.msg import Measurement, Reference
+from maglev_msgs.msg import Currents, Measurement, Reference
 from maglev_node.node import MaglevNode, SourceParameters
 from maglev_node.node import main as run_main
 from maglev_node.parameters import parameter
 from maglev_node.polling import Queues
 from maglev_node.stamp import stamp_now
-from maglev_node.topics import MEASUREMENT, REFERENCE, sample_qos
+from maglev_node.topics import CURRENTS, MEASUREMENT, REFERENCE, sample_qos
 from maglev_reference.accuracy import summary, warnings
 from maglev_reference.check import UnreachableError
 from maglev_reference.geometry import outputs
@@ -93,6 +93,10 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         self._publisher = self.create_publisher(Reference, REFERENCE, sample_qos())
         self._queues = Queues(self)
         self._measurements = self._queues.subscribe(MEASUREMENT, Measurement, depth=1)
+        # In real time nobody waits for the controller but us; in lockstep it waits for us.
+        self._answers = None
+        if self.parameters.mode == 'realtime':
+            self._answers = self._queues.subscribe(CURRENTS, Currents, depth=1)
         self.create_service(Trigger, '~/lift_off', self._lift_off)
         self.create_service(Trigger, '~/land', self._land)
         self.create_timer(self.parameters.poll_period, self._poll, clock=self.steady_clock)
@@ -119,7 +123,8 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
             self._follow_phase(self._timeline)
 
     def _wait(self, measurement: Measurement | None) -> None:
-        if measurement is not None and self._listeners() >= self._expected:
+        answered = self._answers is None or any(self._answers.take(1))
+        if measurement is not None and answered and self._listeners() >= self._expected:
             self._start(measurement)
         elif time.monotonic() - self._reminded > _REMINDER:
             self._reminded = time.monotonic()
@@ -132,7 +137,9 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         there = self._listeners()
         if there < self._expected:
             return f'waiting for {self._expected} subscribers of {REFERENCE}, {there} are there'
-        return f'waiting for a stage on {MEASUREMENT}'
+        if self._measurements.publisher_count() == 0:
+            return f'waiting for a stage on {MEASUREMENT}'
+        return f'waiting for the controller to answer on {CURRENTS}'
 
     def _start(self, measurement: Measurement) -> None:
         if not self.alone():
