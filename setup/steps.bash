@@ -173,6 +173,7 @@ END
     setting PYTHONNOUSERSITE 1
     printf 'export NUMBA_CACHE_DIR=%q"/$(<%q)"\n' "$cache/numba" "$cache/numba/current"
     default ROS_AUTOMATIC_DISCOVERY_RANGE LOCALHOST
+    default FASTRTPS_DEFAULT_PROFILES_FILE "$root/setup/fastdds.xml"
     default OPENBLAS_NUM_THREADS 1
     default OMP_NUM_THREADS 1
     echo 'unset -f __maglev_first'
@@ -187,7 +188,7 @@ rclpy.shutdown()'
 
 setting() { printf 'export %s=%q\n' "$1" "$2"; }
 
-default() { printf 'export %s="${%s:-%s}"\n' "$1" "$1" "$2"; }
+default() { printf '[ -n "${%s:-}" ] || %s=%q\nexport %s\n' "$1" "$1" "$2" "$1"; }
 
 first() { # NAME VALUE
   local entry entries

@@ -55,6 +55,11 @@ class ManagedNode(LifecycleNodeMixin, MaglevNode[P]):
     def cleanup(self) -> None:
         """Release everything."""
 
+    def destroy_node(self) -> None:
+        """Leave the graph; rclpy's mixin leaves the state machine, which keeps the node alive."""
+        self._state_machine.destroy_when_not_in_use()
+        super().destroy_node()
+
     @property
     def state(self) -> str:
         """The life-cycle state: unconfigured, inactive, active or finalized."""

@@ -176,9 +176,13 @@ class MaglevNode(Node, Generic[P]):
                 return False
         return True
 
+    def on_probation(self) -> bool:
+        """Whether the node is so young that another of its kind may yet be discovered."""
+        return time.monotonic() - self._started < _PROBATION
+
     def _look_again(self) -> None:
         self.alone()
-        if time.monotonic() - self._started > _PROBATION:
+        if not self.on_probation():
             self._probation.cancel()
 
     @staticmethod

@@ -150,13 +150,18 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
             )
             self._timeline = Timeline(self.parameters, rest, self._autostart)
         except UnreachableError as error:
-            self.fail(str(error))
+            self._refuse(str(error))
         except ValueError as error:
-            self.fail(f'lift-off refused: {error}; check the encoders')
+            self._refuse(f'lift-off refused: {error}; check the encoders')
         else:
             self._origin = self._newest
             start = 'starting' if self._autostart else 'resting until ~/lift_off'
             self.get_logger().info(f'{start} at sample {self._origin}')
+
+    def _refuse(self, message: str) -> None:
+        """Fail; but while another reference may yet be discovered, it may be flying the platen."""
+        if not self.on_probation():
+            self.fail(message)
 
     def _publish(self, timeline: Timeline) -> None:
         wanted = self._newest + self.parameters.lead - self._origin

@@ -1,0 +1,47 @@
+"""A node that ends gives back what the middleware holds for it."""
+
+from __future__ import annotations
+
+import signal
+import time
+from pathlib import Path
+
+import pytest
+from graph import Nodes
+from rclpy.utilities import get_rmw_implementation_identifier
+
+
+def shared_memory(pid: int) -> set[Path]:
+    """The segments of its own through which a process that uses Fast DDS gives its messages."""
+    maps = Path(f'/proc/{pid}/maps').read_text().split()
+    return {Path(word) for word in maps if word.startswith('/dev/shm/fastrtps_')}
+
+
+@pytest.mark.skipif(
+    get_rmw_implementation_identifier() != 'rmw_fastrtps_cpp', reason='another middleware'
+)
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    ('name', 'arguments'),
+    [
+        ('plant', ()),
+        ('hw_bridge', ()),
+        ('hw_bridge', ('autostart:=false',)),
+        ('controller', ()),
+        ('reference', ()),
+        ('monitor', ()),
+    ],
+)
+def test_no_shared_memory_stays(
+    nodes: Nodes, name: str, arguments: tuple[str, ...], number: signal.Signals
+) -> None:
+    node = nodes.start(name, *arguments)
+    deadline = time.monotonic() + 30
+    while not (held := shared_memory(node.pid)):
+        assert node.running, node.output
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    time.sleep(0.2)
+    node.signal(number)
+    assert node.wait() == 128 + number, node.output
+    assert not [path for path in held if path.exists()]
