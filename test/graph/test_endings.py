@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import time
 from pathlib import Path
@@ -12,9 +13,12 @@ from rclpy.utilities import get_rmw_implementation_identifier
 
 
 def shared_memory(pid: int) -> set[Path]:
-    """The segments of its own through which a process that uses Fast DDS gives its messages."""
-    maps = Path(f'/proc/{pid}/maps').read_text().split()
-    return {Path(word) for word in maps if word.startswith('/dev/shm/fastrtps_')}
+    """The segments of its own through which a process that uses Fast DDS gives its messages.
+
+    Those of the ports, which have a name, belong to all processes of a domain.
+    """
+    maps = Path(f'/proc/{pid}/maps').read_text()
+    return {Path(name) for name in re.findall(r'/dev/shm/fastrtps_[0-9a-f]{16}\b', maps)}
 
 
 @pytest.mark.skipif(

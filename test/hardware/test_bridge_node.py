@@ -12,7 +12,7 @@ from graph import Nodes, Observer, Process
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 
-from maglev_msgs.msg import Currents
+from maglev_msgs.msg import ControllerState, Currents
 from maglev_node.topics import (
     CONTROLLER_STATE,
     CURRENTS,
@@ -70,12 +70,12 @@ def height(observer: Observer) -> float:
     return LOWER_STOP if newest is None else float(np.mean(newest.gap))
 
 
-def answer(observer: Observer) -> Callable[[int], None]:
-    """A controller of the test's own, that wants no current."""
+def answer(observer: Observer) -> Callable[..., None]:
+    """A controller of the test's own, that wants the same direct current [A] of every motor."""
     publisher = observer.node.create_publisher(Currents, CURRENTS, sample_qos())
 
-    def publish(sequence: int) -> None:
-        publisher.publish(Currents(sequence=sequence))
+    def publish(sequence: int, current: float = 0.0) -> None:
+        publisher.publish(Currents(sequence=sequence, direct_current=[current] * 4))
 
     return publish
 
@@ -95,6 +95,34 @@ def test_lockstep_as_every_stage(stage: str, nodes: Nodes, observer: Observer) -
     assert seen == sorted(seen)
     process.signal(signal.SIGTERM)
     assert process.wait() == 143
+
+
+@pytest.mark.parametrize('stage', ['plant', 'hw_bridge'])
+def test_currents_are_followed_once_they_have_been_zero(
+    stage: str, nodes: Nodes, observer: Observer
+) -> None:
+    nodes.start(stage, params=FILES[stage])
+    observer.watch(MEASUREMENT)
+    observer.wait(lambda: bool(numbers(observer)))
+    publish = answer(observer)
+
+    def lifts_with(current: float, samples: int) -> bool:
+        end = max(numbers(observer)) + samples
+        while (newest := max(numbers(observer))) < end:
+            publish(newest, current)
+            observer.serve(0.002)
+        return height(observer) < LOWER_STOP - 5e-5
+
+    lifting = -5.0
+    assert not lifts_with(
+        lifting, 60
+    )  # a controller that flies already when the stage is activated
+    assert observer.call(f'/{stage}/emergency_stop').success
+    assert not lifts_with(lifting, 5)
+    assert observer.call(f'/{stage}/reset').success
+    assert not lifts_with(lifting, 60)  # or that went on flying all the time
+    assert not lifts_with(0.0, 2)
+    assert lifts_with(lifting, 60)
 
 
 @pytest.mark.parametrize('stage', ['plant', 'hw_bridge'])
@@ -185,7 +213,9 @@ def test_an_emergency_stop_lands_and_stays(nodes: Nodes, observer: Observer) -> 
     observer.wait(lambda: 'emergency stop' in life.fault())
     graph['reference'].kill()
     observer.wait(lambda: observer.call('/hw_bridge/reset').success)
-    assert height(observer) > LOWER_STOP - 1e-5
+    observer.wait(lambda: observer.newest(CONTROLLER_STATE).mode == ControllerState.DISABLED)
+    rest = [np.mean(message.gap) for message in observer.look()[MEASUREMENT][-200:]]
+    assert min(rest) > LOWER_STOP - 1e-5
 
 
 def test_deactivated_in_flight_it_lands_first(nodes: Nodes, observer: Observer) -> None:

@@ -20,8 +20,8 @@ def test_land_swap_lift_off(nodes: Nodes, observer: Observer) -> None:
         newest = observer.newest(TRUE_STATE)
         return newest is not None and newest.state[0] < 0.026
 
-    def over() -> bool:
-        return observer.newest(REFERENCE).phase == Reference.END
+    def flights() -> int:
+        return reference.output.count('END at sample')
 
     plant = nodes.start('plant', 'watchers:=1', params=('benchmark.yaml',))
     controller = nodes.start('controller', 'watchers:=1')
@@ -36,7 +36,7 @@ def test_land_swap_lift_off(nodes: Nodes, observer: Observer) -> None:
     assert observer.call('/reference/lift_off').success
     observer.wait(airborne)
     assert observer.call('/reference/land').success
-    observer.wait(over)
+    observer.wait(lambda: flights() == 1)
     plant.signal(signal.SIGTERM)
     assert plant.wait() == 128 + signal.SIGTERM
 
@@ -47,7 +47,7 @@ def test_land_swap_lift_off(nodes: Nodes, observer: Observer) -> None:
     assert observer.call('/reference/lift_off').success
     observer.wait(airborne)
     assert observer.call('/reference/land').success
-    observer.wait(over)
+    observer.wait(lambda: flights() == 2)
     assert observer.newest(TRUE_STATE).state[0] == pytest.approx(0.031, abs=1e-4)
     for process in (controller, reference, bridge):
         assert process.running, process.output

@@ -90,8 +90,11 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
 
     def _take_references(self) -> None:
         """Take what has arrived ahead of time, in bursts: being woken for each slows the loop."""
+        references = self.supervisor.references
         for message, _ in self._references.take():
-            self.supervisor.references.store(
+            if message.sequence <= references.newest and self.supervisor.flying:
+                continue  # of a second reference, which will find the first and leave
+            references.store(
                 message.sequence,
                 message.phase,
                 message.segment,
@@ -116,6 +119,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
             self.get_logger().warning('the stage began anew')
             self.supervisor.restart()
             self._sequence, self._pending = -1, None
+            self._reference_lost = self._reference_over = False
         elif sequence - self._sequence > self._longest_gap and self.supervisor.flying:
             self.supervisor.cut(f'{sequence - self._sequence - 1} measurements are missing')
         if self.supervisor.references.newest < sequence:

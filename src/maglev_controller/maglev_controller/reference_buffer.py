@@ -10,7 +10,9 @@ class ReferenceBuffer:
     """Holds the newest ``capacity`` references in a ring; a sample number is its own place.
 
     ``position``, ``velocity``, ``acceleration`` have shape (capacity, 5), ``phase`` and ``segment``
-    (capacity,); the row of a sample is what :meth:`find` returns.
+    (capacity,); the row of a sample is what :meth:`find` returns. References come in order: one
+    that is not newer than the newest is the first of another run, and what is held of the run
+    before is forgotten. ``renewed`` says that this happened since the last sample was answered.
     """
 
     def __init__(self, capacity: int = 1024) -> None:
@@ -22,11 +24,18 @@ class ReferenceBuffer:
         self.velocity: NDArray[np.float64] = np.zeros((capacity, 5))
         self.acceleration: NDArray[np.float64] = np.zeros((capacity, 5))
         self.newest = -1
+        self.renewed = False
 
     def clear(self) -> None:
         """Forget everything."""
         self.sequence[:] = -1
         self.newest = -1
+        self.renewed = False
+
+    def stage_began_anew(self) -> None:
+        """Forget the run before, unless the references of the new one are here already."""
+        if not self.renewed:
+            self.clear()
 
     def store(
         self,
@@ -38,6 +47,9 @@ class ReferenceBuffer:
         acceleration: ArrayLike,
     ) -> None:
         """Keep the reference of one sample; arrays (5,) in output order."""
+        if sequence <= self.newest:
+            self.clear()
+            self.renewed = True
         row = sequence % self.capacity
         self.sequence[row] = sequence
         self.phase[row] = phase
@@ -45,9 +57,9 @@ class ReferenceBuffer:
         self.position[row] = position
         self.velocity[row] = velocity
         self.acceleration[row] = acceleration
-        self.newest = max(self.newest, sequence)
+        self.newest = sequence
 
     def find(self, sequence: int) -> int:
         """The row of a sample's reference, -1 when it has not arrived or is forgotten."""
         row = sequence % self.capacity
-        return row if self.sequence[row] == sequence else -1
+        return row if self.sequence[row] == sequence >= 0 else -1

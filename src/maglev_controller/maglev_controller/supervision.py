@@ -123,8 +123,8 @@ class Supervisor:
         return True, f'cleared: {cleared}'
 
     def restart(self) -> None:
-        """The stage began anew: what was known of it and of the reference is void."""
-        self.references.clear()
+        """The stage began anew: what was known of it, and of its reference, is void."""
+        self.references.stage_began_anew()
         if self.flying:
             self.mode, self.reason = Mode.WAITING, ''
         self._no_current()
@@ -135,6 +135,7 @@ class Supervisor:
         ``row`` is that of its reference in :attr:`references`, -1 when there is none, which in
         flight means that the reference is lost.
         """
+        self.references.renewed = False
         if self.mode == Mode.WAITING and row >= 0 and self._wants_current(row):
             self.regulator.reset()
             self.mode = Mode.REGULATING

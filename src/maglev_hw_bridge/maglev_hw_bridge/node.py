@@ -159,6 +159,9 @@ class BridgeNode(StageNode):
         assert self.stage is not None
         if self.stage.mode is Mode.LOST:
             return
+        if not self.heeds(direct_current, quadrature_current):
+            self._hold()
+            return
         try:
             self.stage.write(direct_current, quadrature_current)
         except StageError:
@@ -246,6 +249,8 @@ class BridgeNode(StageNode):
             return response
         lost = self.stage.mode is Mode.LOST
         response.success, response.message = self.stage.reset()
+        if response.success:
+            self._armed = False
         self._report()
         if response.success and lost and self._timer is not None:
             self._answered = False

@@ -69,7 +69,9 @@ class StageNode(ManagedNode[Any]):
     Lockstep: the first sample is repeated until a controller answers it; from then on each sample
     waits for the currents with its sequence number. Real time: a sample every ``sample_time``, with
     the newest currents, hence one sample of delay. A fault is latched: no current until
-    ``~/reset``. Configured, it holds its stage and its place on the graph; active, it samples.
+    ``~/reset``. Then, as after activation, currents are followed only once they have been zero: a
+    controller that went on flying meanwhile would throw the platen off its stop.
+    Configured, it holds its stage and its place on the graph; active, it samples.
     """
 
     def __init__(
@@ -85,6 +87,7 @@ class StageNode(ManagedNode[Any]):
         self.fault: str | None = None
         self.late_samples = 0
         self._answered = False
+        self._armed = False
         self._zero = np.zeros(4)
         self._direct = np.zeros(4)
         self._quadrature = np.zeros(4)
@@ -128,7 +131,7 @@ class StageNode(ManagedNode[Any]):
             period, action = self.tick_period, self._on_tick
             self.take_realtime_priority()
         self.start_stage()
-        self._answered = False
+        self._answered = self._armed = False
         self._currents_sequence = -1
         self._sample = self.stage.read()
         self.sequence += 1
@@ -263,8 +266,15 @@ class StageNode(ManagedNode[Any]):
     def publish_more(self) -> None:
         """What a stage publishes beside each measurement."""
 
+    def heeds(self, direct_current: Any, quadrature_current: Any) -> bool:
+        """Whether currents are followed: from when they have been zero, see the class."""
+        if not self._armed:
+            flowing = np.any(direct_current) or np.any(quadrature_current)
+            self._armed = self._answered and not flowing
+        return self._armed
+
     def _apply(self, direct_current: Any, quadrature_current: Any) -> None:
-        if self.fault is None:
+        if self.fault is None and self.heeds(direct_current, quadrature_current):
             try:
                 self.stage.write(direct_current, quadrature_current)
                 return
@@ -285,7 +295,8 @@ class StageNode(ManagedNode[Any]):
     def _reset(self, _request: Any, response: Any) -> Any:
         response.success = self.fault is not None
         response.message = f'cleared: {self.fault}' if self.fault else 'there is no fault'
-        self.fault = None
+        if self.fault is not None:
+            self.fault, self._armed = None, False
         return response
 
     def on_parameters(self, parameters: Any) -> None:
@@ -311,6 +322,12 @@ class StageNode(ManagedNode[Any]):
             return DiagnosticStatus.ERROR, f'currents cut: {self.fault}', facts
         if not self._answered:
             return DiagnosticStatus.WARN, 'waiting for a controller', facts
+        if not self._armed:
+            return (
+                DiagnosticStatus.WARN,
+                'no current until the controller has commanded none',
+                facts,
+            )
         if self.late_samples:
             return DiagnosticStatus.WARN, 'some currents came late', facts
         return DiagnosticStatus.OK, 'running', facts
