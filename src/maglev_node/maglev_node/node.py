@@ -16,6 +16,7 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -32,6 +33,9 @@ DISCOVERY_TIME = 1.0
 
 _PROBATION = 5.0
 """How long it goes on looking afterwards, and is the one to leave [s]."""
+
+_DELIVERY_TIME = 0.5
+"""Longest wait at the end for readers to have what was published [s]."""
 
 _BACKGROUND_NICENESS = 5
 
@@ -293,5 +297,14 @@ def _is_user_error(error: Exception) -> bool:
 def _close(node: MaglevNode[Any] | None) -> None:
     if node is not None:
         node.close()
+        _deliver(node)
         node.destroy_node()
     rclpy.try_shutdown()
+
+
+def _deliver(node: Node) -> None:
+    """Give what was published last, such as currents of zero, the time to arrive."""
+    deadline = time.monotonic() + _DELIVERY_TIME
+    for publisher in node.publishers:
+        left = max(deadline - time.monotonic(), 0.0)
+        publisher.wait_for_all_acked(Duration(seconds=left))
