@@ -1,4 +1,9 @@
-"""What is watched at every sample: whether the encoders can be believed and where the platen is."""
+"""What is watched at every sample: whether the encoders can be believed and where the platen is.
+
+The first encoder that fails can mostly be done without, long enough for a landing: a rigid platen's
+gap follows from the other three, and what x or z jumped by is known. A second one cannot, nor x or
+z that stands still in motion, nor gaps that contradict each other and none stands out.
+"""
 
 from __future__ import annotations
 
@@ -41,6 +46,12 @@ LOWER: Final = 12  # y, x, z, phi, theta
 UPPER: Final = 17
 LIMITS: Final = 22
 
+# Indices into mended.
+MENDED: Final = 0  # the encoder that is done without, -1: none
+OFFSET: Final = 1  # what x or z reads too much [m]
+JUST_NOW: Final = 2  # 1: since this sample
+
+_AHEAD = 1e-3  # [s]
 _SLOW_BANDWIDTH = 100.0  # [rad/s]
 _RESIDUAL_SAMPLES = 2
 _SLIP = 1e-4  # [m]
@@ -52,13 +63,17 @@ class GuardArrays(NamedTuple):
 
     machine: FloatArray  # (24,)
     limits: FloatArray  # (LIMITS,)
-    past: FloatArray  # (2, 6) lengths one and two samples ago [m]
+    believed: FloatArray  # (6,) lengths, put right where one encoder fails [m]
+    mended: FloatArray  # (3,): see the indices above
+    past: FloatArray  # (2, 6) believed lengths of the last sample and the one before [m]
     seen: FloatArray  # (2,): samples seen, samples in a row with too large a residual
+    residual: FloatArray  # (1,): g1 + g3 - g2 - g4 as it is read [m]
     still: FloatArray  # (6,): gaps: what the others told at its last change; x, z: way unseen [m]
     slow: FloatArray  # (2,) rates of x, z that a stuck encoder is judged by [m/s]
     i_q: FloatArray  # (4,) put out last [A]
     position: FloatArray  # (5,) y, x, z, phi, theta [m, rad]
     rate: FloatArray  # (5,) [m/s, rad/s]
+    gap_rate: FloatArray  # (4,) [m/s]
 
 
 @compiled
@@ -126,16 +141,56 @@ def _stuck_horizontal(g: GuardArrays, length: FloatArray, axis: int) -> bool:
 
 
 @compiled
-def _estimate(g: GuardArrays, length: FloatArray) -> float:
-    """Update position and rate from the lengths; returns the residual of the gaps [m]."""
+def _believe(g: GuardArrays, length: FloatArray) -> None:
+    """Fill in what is believed of the lengths (6,) that are read [m]."""
+    g.believed[:] = length
+    encoder = int(g.mended[MENDED])
+    if encoder >= 4:
+        g.believed[encoder] -= g.mended[OFFSET]
+    elif encoder >= 0:
+        g.believed[encoder] = _others(length, encoder)
+
+
+@compiled
+def _mend(g: GuardArrays, length: FloatArray, code: int, encoder: int) -> bool:
+    """Do without an encoder from now on; whether that can be done."""
+    if g.mended[MENDED] >= 0.0 or (code == STUCK and encoder >= 4):
+        return False
+    g.mended[MENDED], g.mended[JUST_NOW] = encoder, 1.0
+    if encoder >= 4:
+        g.mended[OFFSET] = length[encoder] - _foreseen(g, encoder)
+    else:
+        g.gap_rate[encoder] = _others(g.gap_rate, encoder)
+    _believe(g, length)
+    return True
+
+
+@compiled
+def _estimate(g: GuardArrays) -> None:
+    """Update position and rate from the believed lengths."""
     machine = machine_from_array(g.machine)
     before = g.position.copy()
-    residual = outputs_from_gaps(machine, length[:4], length[4], length[5], g.position)
-    if g.seen[0] > 0.0:
-        for axis in range(5):
-            quotient = (g.position[axis] - before[axis]) / g.limits[PERIOD]
-            g.rate[axis] += g.limits[RATE] * (quotient - g.rate[axis])
-    return residual
+    outputs_from_gaps(machine, g.believed[:4], g.believed[4], g.believed[5], g.position)
+    if g.seen[0] == 0.0:
+        return
+    share, period = g.limits[RATE], g.limits[PERIOD]
+    for axis in range(5):
+        g.rate[axis] += share * ((g.position[axis] - before[axis]) / period - g.rate[axis])
+    for i in range(4):
+        quotient = (g.believed[i] - g.past[0, i]) / period
+        g.gap_rate[i] += share * (quotient - g.gap_rate[i])
+
+
+@compiled
+def _estimate_mended(g: GuardArrays) -> None:
+    """Position and rate when one gap has just been found not to be what was read for a while."""
+    machine = machine_from_array(g.machine)
+    outputs_from_gaps(machine, g.believed[:4], g.believed[4], g.believed[5], g.position)
+    ahead = g.position.copy()
+    gaps = g.believed[:4] + _AHEAD * g.gap_rate
+    outputs_from_gaps(machine, gaps, g.believed[4], g.believed[5], ahead)
+    for axis in (0, 3, 4):
+        g.rate[axis] = (ahead[axis] - g.position[axis]) / _AHEAD
 
 
 @compiled
@@ -151,10 +206,17 @@ def _out_of_range(g: GuardArrays, length: FloatArray) -> tuple[int, int]:
 
 
 @compiled
+def _foreseen(g: GuardArrays, i: int) -> float:
+    """What the two samples before foretell of a length [m]."""
+    return float(2.0 * g.past[0, i] - g.past[1, i])
+
+
+@compiled
 def _unbelievable(g: GuardArrays, length: FloatArray, flying: bool) -> tuple[int, int]:
     for i in range(6):
-        foreseen = 2.0 * g.past[0, i] - g.past[1, i]
-        if g.seen[0] >= 2.0 and abs(length[i] - foreseen) > g.limits[MAX_JUMP]:
+        if i < 4 and i == g.mended[MENDED]:
+            continue
+        if g.seen[0] >= 2.0 and abs(length[i] - _foreseen(g, i)) > g.limits[MAX_JUMP]:
             return JUMP, i
     stuck = _stuck_gap(g, length)
     for axis in range(2):
@@ -169,18 +231,27 @@ def _unbelievable(g: GuardArrays, length: FloatArray, flying: bool) -> tuple[int
 def watch(g: GuardArrays, length: FloatArray, flying: bool) -> tuple[int, int]:
     """Judge one sample: ``length`` (6,), gaps 1..4, x, z [m]; updates position and rate.
 
-    Returns a code and the encoder or axis it is about. Range and stuck encoders count in flight.
+    Returns a code and the encoder or axis it is about; ``mended`` tells whether the encoder is done
+    without from now on. Range and stuck encoders count in flight.
     """
-    residual = _estimate(g, length)
-    code, index = _unbelievable(g, length, flying)
-    g.seen[1] = g.seen[1] + 1.0 if abs(residual) > g.limits[MAX_RESIDUAL] else 0.0
+    g.residual[0] = _residual(length)
+    g.mended[JUST_NOW] = 0.0
+    _believe(g, length)
+    code, index = _unbelievable(g, g.believed, flying)
+    if code == STUCK and _mend(g, length, code, index):
+        _estimate_mended(g)
+    else:
+        if code == JUMP:
+            _mend(g, length, code, index)
+        _estimate(g)
+    g.seen[1] = g.seen[1] + 1.0 if abs(_residual(g.believed)) > g.limits[MAX_RESIDUAL] else 0.0
     if code == FINE and g.seen[1] >= _RESIDUAL_SAMPLES:
         code = RESIDUAL
     if code == FINE and flying:
-        code, index = _out_of_range(g, length)
+        code, index = _out_of_range(g, g.believed)
     for i in range(6):
-        g.past[1, i] = g.past[0, i] if g.seen[0] > 0.0 else length[i]
-        g.past[0, i] = length[i]
+        g.past[1, i] = g.past[0, i] if g.seen[0] > 0.0 else g.believed[i]
+        g.past[0, i] = g.believed[i]
     g.seen[0] += 1.0
     return code, index
 
@@ -206,20 +277,25 @@ class Guard:
         self.arrays = GuardArrays(
             machine=machine_to_array(machine_constants(machine)),
             limits=limits,
+            believed=np.zeros(6),
+            mended=np.array([-1.0, 0.0, 0.0]),
             past=np.zeros((2, 6)),
             seen=np.zeros(2),
+            residual=np.zeros(1),
             still=np.zeros(6),
             slow=np.zeros(2),
             i_q=np.zeros(4),
             position=np.zeros(5),
             rate=np.zeros(5),
+            gap_rate=np.zeros(4),
         )
 
     def forget(self) -> None:
         """Begin anew: the next sample is the first."""
-        for array in (self.arrays.seen, self.arrays.slow, self.arrays.rate, self.arrays.i_q):
+        a = self.arrays
+        for array in (a.seen, a.slow, a.rate, a.gap_rate, a.i_q, a.still):
             array[:] = 0.0
-        self.arrays.still[:] = 0.0
+        a.mended[:] = -1.0, 0.0, 0.0
 
     def watch(self, length: FloatArray, flying: bool) -> tuple[int, int]:
         """Judge one sample; see :func:`watch`."""
@@ -227,5 +303,10 @@ class Guard:
 
     @property
     def residual(self) -> float:
-        """``g1 + g3 - g2 - g4`` of the last sample [m]."""
-        return _residual(self.arrays.past[0])
+        """``g1 + g3 - g2 - g4`` of the last sample, as it was read [m]."""
+        return float(self.arrays.residual[0])
+
+    @property
+    def mended(self) -> bool:
+        """Whether what the last sample found wrong with an encoder is put right from then on."""
+        return bool(self.arrays.mended[JUST_NOW])

@@ -63,21 +63,26 @@ def currents(
     """Write the i_d, i_q (4,) [A] that accelerate y, x, z, phi, theta, (5,), by (1), (2), (6), (7).
 
     ``position`` (5,) [m, rad]; no motor gets more than ``limit`` [A], what carries comes first.
+    With a single motor that is motor 2, for y and x.
     """
     machine = machine_from_array(machine_array)
     gap = np.empty(4)
     gaps_from_outputs(machine, position, gap)
-    share = 0.25 * machine.M_y * (acceleration[0] - machine.G)
-    lever = 0.5 * machine.I_x / machine.r
+    single = machine.motors == 1.0
+    share = machine.M_y * (acceleration[0] - machine.G) / machine.motors
+    lever = 0.0 if single else 0.5 * machine.I_x / machine.r
     tilt_phi = lever * (acceleration[3] + machine.k_s_phi * position[3])
     tilt_theta = lever * (acceleration[4] + machine.k_s_theta * position[4])
     vertical = (share - tilt_phi, share + tilt_theta, share + tilt_phi, share - tilt_theta)
     factor = np.empty((4, 3))
     for i in range(4):
         factor[i, 0], factor[i, 1], factor[i, 2] = attraction_coefficients(machine, gap[i])
-    u_x = -machine.M_x * acceleration[1] / (factor[1, 2] + factor[3, 2])
+    along_x = factor[1, 2] if single else factor[1, 2] + factor[3, 2]
+    u_x = -machine.M_x * acceleration[1] / along_x
     u_z = -machine.M_z * acceleration[2] / (factor[0, 2] + factor[2, 2])
-    for i in range(4):
+    i_d[:] = 0.0
+    i_q[:] = 0.0
+    for i in range(1, 2) if single else range(4):
         a, b = factor[i, 0], factor[i, 1]
         wanted = u_z if i % 2 == 0 else u_x
         level = math.sqrt(max(-vertical[i], 0.0))

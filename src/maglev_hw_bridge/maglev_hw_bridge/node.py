@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import time
 from collections.abc import Mapping
 from typing import Any
 
@@ -139,6 +140,7 @@ class BridgeNode(StageNode):
             return
         self._advance()
         self._rearm()
+        self.take_currents()
         newest = self._currents_sequence
         if self._answered and newest < self.sequence - 1:
             self.late_samples += 1
@@ -151,7 +153,8 @@ class BridgeNode(StageNode):
     def _rearm(self) -> None:
         """Come back a little before the boards' next tick, and serve the graph until then."""
         assert self.stage is not None
-        wait = max(_EARLY * self.sample_time - self.stage.driver.late, _SHORTEST_WAIT)
+        passed = self.stage.driver.late + time.monotonic() - self._sample_wall_time
+        wait = max(_EARLY * self.sample_time - passed, _SHORTEST_WAIT)
         self._timer.timer_period_ns = int(1e9 * wait)
         self._timer.reset()
 

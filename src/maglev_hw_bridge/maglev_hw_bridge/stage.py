@@ -247,7 +247,7 @@ class BridgeStage:
 
     def _follow(self, i_d: FloatArray, i_q: FloatArray) -> str:
         """Drive the amplifiers as commanded; returns why a command was refused."""
-        x, z = self.encoders.arrays.length[4], self.encoders.arrays.length[5]
+        x, z = self.guard.arrays.believed[4], self.guard.arrays.believed[5]
         code, index = self.amplifiers.drive(i_d, i_q, x, z)
         if code in (amplifiers.FINE, amplifiers.SPENT):
             self._direct[:], self._quadrature[:] = i_d, i_q
@@ -275,7 +275,7 @@ class BridgeStage:
         if self.landing.step(state.position, state.rate):
             self._disable()
             return
-        x, z = self.encoders.arrays.length[4], self.encoders.arrays.length[5]
+        x, z = state.believed[4], state.believed[5]
         i_d, i_q = self.landing.direct_current, self.landing.quadrature_current
         code, _ = self.amplifiers.drive(i_d, i_q, x, z)
         state.i_q[:] = i_q
@@ -382,7 +382,8 @@ class BridgeStage:
                 return
             self._raise_fault('range', *range_fault(code, index, self.guard))
         else:
-            self._raise_fault('encoder', *encoder_fault(code, index, self.guard), cut=True)
+            unsound = not self.guard.mended
+            self._raise_fault('encoder', *encoder_fault(code, index, self.guard), cut=unsound)
 
     def _late(self) -> None:
         self.late_ticks += 1

@@ -15,6 +15,7 @@ from maglev_msgs.msg import Currents, Measurement
 from maglev_node.managed_node import ManagedNode, ManagedParameters
 from maglev_node.node import NodeError
 from maglev_node.parameters import ParameterError, parameter
+from maglev_node.polling import PolledSubscription, Queues
 from maglev_node.stage import EncoderSample, Stage, StageError
 from maglev_node.stamp import stamp_now
 from maglev_node.topics import CURRENTS, MEASUREMENT, sample_qos
@@ -99,7 +100,9 @@ class StageNode(ManagedNode[Any]):
         self._first_sequence = 0  # of this activation
         self._sample: EncoderSample | None = None
         self._publisher: Any = None
-        self._subscription: Any = None
+        self._subscription: Any = None  # lockstep
+        self._queues: Queues | None = None  # real time
+        self._newest_currents: PolledSubscription | None = None
         self._timer: Any = None
         self._lockstep = self.parameters.mode == 'lockstep'
         for service, action in (
@@ -120,8 +123,13 @@ class StageNode(ManagedNode[Any]):
             raise
         self.sequence = self.parameters.first_sequence - 1
         self._publisher = self.create_publisher(Measurement, MEASUREMENT, sample_qos())
-        on_message = self._on_answer if self._lockstep else self._on_currents
-        self._subscription = self.create_subscription(Currents, CURRENTS, on_message, sample_qos())
+        if self._lockstep:
+            self._subscription = self.create_subscription(
+                Currents, CURRENTS, self._on_answer, sample_qos()
+            )
+        else:
+            self._queues = Queues(self)
+            self._newest_currents = self._queues.subscribe(CURRENTS, Currents)
 
     def activate(self) -> None:
         """Take the first sample and begin to sample."""
@@ -151,8 +159,15 @@ class StageNode(ManagedNode[Any]):
             self.destroy_timer(self._timer)
         self._release_stage()
         self.destroy_publisher(self._publisher)
-        self.destroy_subscription(self._subscription)
+        if self._subscription is not None:
+            self.destroy_subscription(self._subscription)
+        self._leave_queues()
         self._publisher = self._subscription = self._timer = None
+
+    def _leave_queues(self) -> None:
+        if self._queues is not None:
+            self._queues.destroy()
+        self._queues = self._newest_currents = None
 
     def _release_stage(self) -> None:
         stage, self.stage = self.stage, None
@@ -200,12 +215,15 @@ class StageNode(ManagedNode[Any]):
 
     # -- real time ---------------------------------------------------------------------------------
 
-    def _on_currents(self, message: Currents) -> None:
-        self._currents_sequence = message.sequence
-        self._direct = message.direct_current
-        self._quadrature = message.quadrature_current
-        # A controller that catches up with what it missed at its start is not late, only not there.
-        self._answered |= message.sequence == self.sequence
+    def take_currents(self) -> None:
+        """The newest currents that have arrived; called at the tick, so that none come too late."""
+        assert self._newest_currents is not None
+        for message, _ in self._newest_currents.take():
+            self._currents_sequence = message.sequence
+            self._direct = message.direct_current
+            self._quadrature = message.quadrature_current
+            # A controller that catches up with what it missed at its start is not late.
+            self._answered |= message.sequence >= self.sequence - 1
 
     def _on_tick(self) -> None:
         due = self._first_sequence + int((time.monotonic() - self._first_tick) / self.sample_time)
@@ -220,6 +238,7 @@ class StageNode(ManagedNode[Any]):
             self._tick()
 
     def _tick(self) -> None:
+        self.take_currents()
         if self._answered:
             age = self.sequence - self._currents_sequence
             if age > 0:
@@ -335,3 +354,4 @@ class StageNode(ManagedNode[Any]):
     def close(self) -> None:
         """No current flows, and the stage is released."""
         self._release_stage()
+        self._leave_queues()

@@ -140,7 +140,10 @@ class EmulatedBoards:
             for _ in range(1 + late):
                 self.tick()
             return
+        passed = self.ticks
         self.catch_up()
+        if self.ticks > passed:
+            return
         ahead = self._started + (self.ticks + 1) * self.period - self._clock()
         if ahead > 0.0:
             self._sleep(ahead)
