@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bridge_flight import OMEGA, Flight, ellipse, hover
 
-from maglev_hw_bridge.landing import impact_of_cut
+from maglev_hw_bridge.landing import currents, impact_of_cut
 from maglev_hw_bridge.stage import Mode
 
 SOFT = 0.05  # [m/s]
@@ -62,6 +62,25 @@ def test_landed_softly_though_the_machine_is_not_as_known(offset: dict[str, floa
     flight.stage.land('test')
     flight.until_no_current()
     assert flight.rig.impact <= SOFT
+
+
+def test_the_single_motor_machine_lands_softly() -> None:
+    single = {'machine.motors': 1, 'machine.mass_y': 1.725, 'machine.mass_x': 5.3}
+    locked = {'emulation.guide.locked': [False, False, True, True, True]}
+    flight = Flight(hover(0.022, 0.01), {**single, **locked})
+    i_d, i_q = np.zeros(4), np.zeros(4)
+    for _ in range(8):
+        flight.stage.read()
+        watched = flight.stage.guard.arrays
+        currents(watched.machine, watched.position, np.zeros(5), 7.0, i_d, i_q)
+        assert not np.any(i_d[[0, 2, 3]])
+        flight.stage.write(i_d, i_q)
+    flight.rig.forget_impact()
+    flight.stage.land('test')
+    flight.until_no_current()
+    assert flight.stage.fault is None
+    assert flight.rig.impact <= SOFT
+    assert flight.rig.state[0] == 0.031
 
 
 @pytest.mark.parametrize('y', [0.0185, 0.020, 0.025, 0.0285, 0.030])
