@@ -116,20 +116,23 @@ def test_bag_and_live_run_give_the_same_figures(
         assert all(e.offered_qos_profiles[0].reliability.name == 'RELIABLE' for e in sampled)
 
 
-def test_a_run_that_is_broken_off_leaves_what_there_was(nodes: Nodes, feeder: Feeder) -> None:
+def test_a_run_that_is_broken_off_leaves_what_there_was(
+    nodes: Nodes, observer: Observer, feeder: Feeder
+) -> None:
     bag = nodes.folder / 'bag'
     recorder = nodes.start('recorder', f'output:={bag}', 'flush_period:=0.1')
     monitor = start_monitor(nodes)
     feeder.wait_for(2)
     feeder.feed(0, 1000)
-    time.sleep(0.4)
+    complete = dict.fromkeys(TOPICS, 1000)
+    observer.wait(lambda: recorded(bag) == complete)  # on the disk, while the recorder runs
     recorder.signal(signal.SIGKILL)
     monitor.signal(signal.SIGTERM)
     assert monitor.wait() == 143
     assert metrics(nodes)['verdict'] == 'incomplete'
     assert metrics(nodes)['run_samples'] > 900
     assert recorder.wait() == 137
-    assert recorded(bag) == dict.fromkeys(TOPICS, 1000)
+    assert recorded(bag) == complete
     assert 'recovered' in analyse(bag).notes[0]
 
 
