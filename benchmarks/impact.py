@@ -59,7 +59,7 @@ def airborne(motion: Motion) -> tuple[BridgeStage, EmulatedDriver]:
 
 
 def landed(motion: Motion, jumping: int | None = None) -> float:
-    """Speed at the stop when the bridge lands, asked to or because an encoder (0..5) jumps [m/s]."""
+    """Speed at the stop when the bridge lands because it must, or an encoder (0..5) jumps [m/s]."""
     stage, driver = airborne(motion)
     if jumping is None:
         stage.land('benchmark')

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from bridge_flight import Flight, ellipse, hover
 
+from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.stage import Mode
+from maglev_node.parameters import build
 from maglev_node.stage import StageError
 
 LOWER_STOP = 0.031
@@ -47,6 +49,16 @@ def since(flight: Flight, do: Callable[[], None], samples: int) -> int:
     assert flight.stage.fault is not None, 'not detected'
     assert flight.detected is not None
     return flight.detected - start
+
+
+def test_only_emulated_boards_are_patient() -> None:
+    patience = {'emulation.patience': 0.04}
+    emulated = build(BridgeParameters, patience).in_real_time()
+    assert (emulated.fault.stale, emulated.boards.overrun, emulated.boards.watchdog) == (0.04,) * 3
+    for driver in ('quanser', 'one_of_your_own'):
+        real = build(BridgeParameters, {'driver': driver, **patience})
+        assert real.in_real_time() == real
+        assert (real.fault.stale, real.boards.overrun, real.boards.watchdog) == (0.005, 0.005, 0.02)
 
 
 def test_without_fresh_currents_it_lands_within_5_ms() -> None:

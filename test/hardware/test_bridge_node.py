@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import time
 from collections.abc import Callable
 
 import numpy as np
@@ -176,16 +177,16 @@ def test_bad_parameters_are_one_clear_line(arguments: list[str], text: str, node
     assert 'Traceback' not in process.output
 
 
-def fly(nodes: Nodes, observer: Observer) -> dict[str, Process]:
+def fly(nodes: Nodes, observer: Observer, mode: str = 'lockstep') -> dict[str, Process]:
     """Bridge, controller and reference on the ellipse, until it is airborne."""
     observer.watch(MEASUREMENT, REFERENCE, CURRENTS, CONTROLLER_STATE, TRUE_STATE)
-    watched = 'watchers:=1'  # by the test
+    common = f'mode:={mode}', 'watchers:=1'  # by the test
     graph = {
         'stage': nodes.start(
-            'hw_bridge', watched, 'answer_timeout:=1.0', params=FILES['hw_bridge']
+            'hw_bridge', *common, 'answer_timeout:=1.0', params=FILES['hw_bridge']
         ),
-        'controller': nodes.start('controller', watched),
-        'reference': nodes.start('reference', watched, 'duration:=600.0', params=(ELLIPSE,)),
+        'controller': nodes.start('controller', *common),
+        'reference': nodes.start('reference', *common, 'duration:=600.0', params=(ELLIPSE,)),
     }
     observer.wait(lambda: height(observer) < 0.026, timeout=60)
     return graph
@@ -203,6 +204,17 @@ def test_a_dead_controller(nodes: Nodes, observer: Observer) -> None:
     assert not observer.call('/hw_bridge/reset').success
     graph['stage'].signal(signal.SIGINT)
     assert graph['stage'].wait() == 130
+
+
+def test_in_real_time_emulated_boards_bear_a_desktop(nodes: Nodes, observer: Observer) -> None:
+    graph = fly(nodes, observer, 'realtime')
+    before = observer.newest(MEASUREMENT).sequence
+    graph['stage'].signal(signal.SIGSTOP)
+    time.sleep(0.022)  # longer than the boards' watchdog on a machine
+    graph['stage'].signal(signal.SIGCONT)
+    observer.wait(lambda: observer.newest(MEASUREMENT).sequence > before + 1000)
+    assert observer.newest(CONTROLLER_STATE).mode == ControllerState.REGULATING
+    assert 'fault' not in graph['stage'].output
 
 
 def test_an_emergency_stop_lands_and_stays(nodes: Nodes, observer: Observer) -> None:

@@ -111,6 +111,14 @@ class EmulationParameters:
     """The machine behind the emulated boards."""
 
     seed: int = parameter(0, lower=0, upper=2**31 - 1, description='seed of the encoder noise')
+    patience: float = parameter(
+        0.0,
+        unit='s',
+        lower=0.0,
+        upper=1.0,
+        description='realtime, emulated boards only: fault.stale, boards.overrun and'
+        ' boards.watchdog are at least this, as a desktop now and then stops its processes',
+    )
     wiring: WiringParameters = group(WiringParameters)
     winding: WindingParameters = group(WindingParameters)
     encoder: EncoderParameters = group(EncoderParameters)

@@ -45,7 +45,8 @@ class BridgeNodeParameters(StageNodeParameters, BridgeParameters):
 
 def _open(parameters: BridgeNodeParameters) -> BridgeStage:
     """The stage on open, checked boards. Raises StageError, ParameterError."""
-    stage = BridgeStage(parameters, realtime=parameters.mode == 'realtime')
+    realtime = parameters.mode == 'realtime'
+    stage = BridgeStage(parameters.in_real_time() if realtime else parameters, realtime=realtime)
     stage.configure()
     return stage
 

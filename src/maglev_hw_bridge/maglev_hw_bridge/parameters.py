@@ -193,3 +193,16 @@ class BridgeParameters:
                 f"parameter 'fault.command_limit' is {self.fault.command_limit:g} A, it must be at "
                 f"least 'amplifier.continuous_current' ({self.amplifier.continuous_current:g} A)"
             )
+
+    def in_real_time(self) -> BridgeParameters:
+        """What holds in real time: with emulated boards no time is below ``emulation.patience``."""
+        if self.driver != 'emulated':
+            return self
+        patience = self.emulation.patience
+        boards = dataclasses.replace(
+            self.boards,
+            watchdog=max(self.boards.watchdog, patience),
+            overrun=max(self.boards.overrun, patience),
+        )
+        fault = dataclasses.replace(self.fault, stale=max(self.fault.stale, patience))
+        return dataclasses.replace(self, boards=boards, fault=fault)

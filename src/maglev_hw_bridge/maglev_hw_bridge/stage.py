@@ -1,7 +1,8 @@
 """The real stage behind the stage contract: encoders, commutation, amplifiers, boards and faults.
 
-While encoders, boards and amplifiers are sound every fault ends in a landing that the bridge makes
-by itself; only when they are not, the current is cut. Either is latched until :meth:`reset`.
+While boards and amplifiers are sound and the encoders tell where the platen is (one that fails can
+be done without), every fault ends in a landing that the bridge makes by itself; otherwise the
+current is cut. Either is latched until :meth:`reset`.
 """
 
 from __future__ import annotations

@@ -234,8 +234,8 @@ class StageNode(ManagedNode[Any]):
                 ' slow or too busy for real time; free a core, or use mode lockstep'
             )
             return
-        # A stage that was held up catches up two samples at a time: in a longer burst no answer could
-        # reach it, and its own delay would look like the controller's.
+        # Held up, it catches up two samples at a time: in a longer burst no answer could reach it,
+        # and its own delay would look like the controller's.
         self._tick()
         if due > self.sequence:
             self._tick()
