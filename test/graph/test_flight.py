@@ -24,7 +24,7 @@ def fly(nodes: Nodes, *arguments: str, mode: str = 'lockstep') -> dict[str, Proc
         'plant': nodes.start('plant', f'mode:={mode}', WATCHED, params=('benchmark.yaml',)),
         'controller': nodes.start('controller', f'mode:={mode}', WATCHED),
         'reference': nodes.start(
-            'reference', f'mode:={mode}', WATCHED, *arguments, params=(ELLIPSE,)
+            'reference', f'mode:={mode}', WATCHED, 'run_in:=1.0', *arguments, params=(ELLIPSE,)
         ),
     }
 

@@ -116,7 +116,10 @@ def test_the_paper_on_its_own_model(tmp_path: Path) -> None:
 
 
 def test_real_time_with_everything_running(tmp_path: Path) -> None:
-    done = run('ellipse', tmp_path / 'run', '--mode', 'realtime', '--duration', '4')
+    soon = tmp_path / 'soon.yaml'
+    soon.write_text('reference: {ros__parameters: {run_in: 1.0}}\n')
+    options = ('--mode', 'realtime', '--duration', '4', '--params', str(soon))
+    done = run('ellipse', tmp_path / 'run', *options)
     assert done.returncode == 0
     figures = metrics(tmp_path / 'run')
     assert figures['timing']['real_time_factor'] == pytest.approx(1.0, abs=0.02)
@@ -127,6 +130,7 @@ def test_real_time_with_everything_running(tmp_path: Path) -> None:
 def test_a_limit_that_is_not_kept_fails(tmp_path: Path) -> None:
     strict = tmp_path / 'strict.yaml'
     strict.write_text(
+        'reference: {ros__parameters: {run_in: 1.0}}\n'
         'monitor: {ros__parameters: {limits: {max_mean_error: [1.0e-9, -1.0, -1.0, -1.0, -1.0]}}}\n'
     )
     done = run('ellipse', tmp_path / 'run', '--duration', '1', '--params', str(strict))
