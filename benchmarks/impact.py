@@ -2,7 +2,8 @@
 
 On emulated boards, from several heights at rest and from the paper's ellipse in 4DOF at full speed,
 also with one encoder that jumps by a millimetre. "foretold" is what the bridge itself computes at a
-cut. Exits with 1 when a landing is not soft.
+cut, without guide friction; near 28.7 mm, where weight and magnets balance, that decides between
+the stops. Exits with 1 when a landing is not soft.
 """
 
 from __future__ import annotations

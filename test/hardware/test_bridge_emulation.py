@@ -104,6 +104,24 @@ def test_real_time_is_paced_by_the_clock() -> None:
     driver.close()
 
 
+@pytest.mark.parametrize(('patience', 'passed'), [(0.04, 10), (0.0, 100)])
+def test_patient_boards_stand_still_while_the_bridge_is_stopped(
+    patience: float, passed: int
+) -> None:
+    now = 0.0
+    parameters = build(BridgeParameters, {**HOME, 'emulation.patience': patience})
+    world = EmulatedBoards(parameters, True, lambda: now)
+    for expected in (passed, 2 * passed):
+        now += 0.1001
+        world.catch_up()
+        assert world.ticks == expected
+        assert world.now() == pytest.approx(1e-3 * expected, abs=1e-3)
+    world.delay(0)
+    now += 0.003
+    world.catch_up()
+    assert world.ticks == 2 * passed + 3
+
+
 def test_currents_rise_no_faster_than_the_supply_lets_them() -> None:
     world = boards(emulation__winding__inductance=0.05, emulation__guide__locked=[True] * 5)
     world.volts[0, 0] = 7.0

@@ -116,8 +116,9 @@ class EmulationParameters:
         unit='s',
         lower=0.0,
         upper=1.0,
-        description='realtime, emulated boards only: fault.stale, boards.overrun and'
-        ' boards.watchdog are at least this, as a desktop now and then stops its processes',
+        description='realtime, emulated boards only, as a desktop now and then stops its processes:'
+        ' fault.stale, boards.overrun and boards.watchdog are at least this, and when the bridge is'
+        ' stopped for longer than a quarter of it, so are the boards; 0: as real ones',
     )
     wiring: WiringParameters = group(WiringParameters)
     winding: WindingParameters = group(WindingParameters)

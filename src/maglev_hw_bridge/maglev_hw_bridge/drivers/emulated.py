@@ -1,7 +1,8 @@
 """Emulated boards: what the vendor's HIL module looks like, with the stage's physics behind it.
 
 The real driver runs on them unchanged. Lockstep: the boards' time stands still until a sample is
-waited for. Real time: it follows the machine's clock, however late one reads.
+waited for. Real time: it follows the machine's clock, however late one reads, unless the parameters
+ask for patience.
 """
 
 from __future__ import annotations
@@ -18,6 +19,9 @@ from maglev_hw_bridge.emulated_card import Clock, Code, DigitalState, EmulatedCa
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.rig import Rig
 from maglev_hw_bridge.signal_parameters import CHANNELS
+
+_STANDSTILL = 0.25
+"""Share of the patience after which the boards stand still with a bridge that is stopped."""
 
 
 def make(parameters: BridgeParameters, realtime: bool) -> EmulatedDriver:
@@ -75,6 +79,9 @@ class EmulatedBoards:
         self.realtime = realtime
         self._clock, self._sleep = clock, sleep
         self._started = clock()
+        self._stood_still = 0.0  # real time [s]
+        patience = parameters.emulation.patience
+        self._longest = max(1, round(_STANDSTILL * patience / self.period)) if patience else 2**62
         self.ticks = 0
         self.cards: dict[str, EmulatedCard] = {}
         self.volts = np.zeros((2, CHANNELS))
@@ -112,8 +119,8 @@ class EmulatedBoards:
     # -- the world ---------------------------------------------------------------------------------
 
     def now(self) -> float:
-        """The boards' time in lockstep, the machine's in real time [s]."""
-        return self._clock() if self.realtime else self.ticks * self.period
+        """The boards' time; in real time the machine's, less what they stood still [s]."""
+        return self._clock() - self._stood_still if self.realtime else self.ticks * self.period
 
     def tick(self) -> None:
         """One sample passes."""
@@ -127,10 +134,13 @@ class EmulatedBoards:
             card.on_tick()
 
     def catch_up(self) -> None:
-        """In real time, let pass what has passed."""
+        """In real time, let pass what has passed; what long stops the bridge stops the boards."""
         if self.realtime:
-            due = int((self._clock() - self._started) / self.period)
-            while self.ticks < due:
+            behind = int((self.now() - self._started) / self.period) - self.ticks
+            still = max(0, behind - self._longest - self._delay)
+            self._stood_still += still * self.period
+            self._delay = 0
+            for _ in range(behind - still):
                 self.tick()
 
     def wait(self) -> None:
@@ -144,7 +154,7 @@ class EmulatedBoards:
         self.catch_up()
         if self.ticks > passed:
             return
-        ahead = self._started + (self.ticks + 1) * self.period - self._clock()
+        ahead = self._started + (self.ticks + 1) * self.period - self.now()
         if ahead > 0.0:
             self._sleep(ahead)
         self.catch_up()
@@ -155,10 +165,9 @@ class EmulatedBoards:
 
     def delay(self, samples: int) -> None:
         """The bridge reads its next sample this late."""
+        self._delay = samples
         if self.realtime:
             self._sleep(samples * self.period)
-        else:
-            self._delay = samples
 
     def expire(self) -> None:
         """The boards' watchdogs expire."""
