@@ -19,7 +19,7 @@ from maglev_hw_bridge.drivers import Driver, DriverError, make_driver
 from maglev_hw_bridge.encoders import Encoders, HomingError
 from maglev_hw_bridge.landing import currents
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_hw_bridge.response import Pulses, Twin
+from maglev_hw_bridge.response import Pulses, Twins
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES, PHASE_NAMES, PHASES
 from maglev_hw_bridge.stage import BridgeStage, Mode
 from maglev_node.parameters import ParameterError, from_yaml
@@ -113,15 +113,15 @@ class Commissioning:
                 'x and z (resolution, direction, cable)'
             )
         pulses = Pulses(self._parameters, self._driver, self._encoders, self._peak)
-        twin = Twin(self._parameters, self._peak)
+        twins = Twins(self._parameters, self._peak)
         seen, foretold = [], []
         for phase in range(PHASES):
             if phase % 3 == 0:
                 self._ask(f'motor {phase // 3 + 1}: up to {self._peak:g} A in each phase alone')
-            foretold.append(twin.phase(phase, pulses.place))
+            foretold.append(twins.phase(phase, pulses.place))
             seen.append(pulses.phase(phase))
             self._tell(f'  {PHASE_NAMES[phase]}: {_in_words(seen[-1])}')
-        finding = diagnose(np.array(seen), np.array(foretold))
+        finding = diagnose(np.array(seen), np.stack(foretold, axis=1))
         if not finding.fine:
             raise WrongError(finding.text)
         self._tell(f'  {finding.text}')

@@ -15,7 +15,7 @@ FloatArray = NDArray[np.float64]
 
 _SEEN = np.array([3e-5] * 4 + [1e-4] * 2)  # less is no answer [m]
 _CLEAR = np.array([1.2e-4] * 4 + [4e-4] * 2)  # more says no more [m]
-_MARGIN = 0.01  # by which one explanation must beat the next
+_MARGIN = 0.015  # by which one explanation must beat the next, else both are named
 _WORST = 0.12  # an explanation further off explains nothing
 
 
@@ -29,18 +29,17 @@ class Finding(NamedTuple):
 def diagnose(seen: FloatArray, foretold: FloatArray) -> Finding:
     """Judge what was seen, (12, 2, 6) [m], by what the parameters' wiring would show.
 
-    First index the phase, then the current's sign (+, -), then the encoder.
+    Indices: phase, the current's sign (+, -), encoder. ``foretold``, (n, 12, 2, 6) [m], has n guesses
+    at the machine before them: every explanation gets the one that suits it best, and the first is
+    the likeliest.
     """
-    silent = _silent(seen, foretold)
+    silent = _silent(seen, foretold[0])
     if silent:
         return Finding(False, silent)
     wanted = _shape(seen)
     ranked = sorted(
-        (
-            (float(np.mean(np.abs(_shape(shown) - wanted))), text)
-            for text, shown in _explanations(foretold)
-        ),
-        key=lambda entry: entry[0],
+        (float(np.min(np.mean(np.abs(_shape(shown) - wanted), axis=(1, 2, 3)))), text)
+        for text, shown in _explanations(foretold)
     )
     (best, text), (next_best, other) = ranked[:2]
     if best > _WORST:
@@ -82,11 +81,11 @@ def _explanations(foretold: FloatArray) -> Iterator[tuple[str, FloatArray]]:
     yield '', foretold
     for phase, name in enumerate(PHASE_NAMES):
         shown = foretold.copy()
-        shown[phase] = foretold[phase, ::-1]
+        shown[:, phase] = foretold[:, phase, ::-1]
         yield f'{name} is turned round: change the sign of element {phase} of amplifier.sign', shown
     for encoder, name in enumerate(ENCODER_NAMES):
         shown = foretold.copy()
-        shown[:, :, encoder] *= -1.0
+        shown[..., encoder] *= -1.0
         yield (
             f'encoder {name} counts the other way: change the sign of element {encoder} of '
             'encoder.direction',
@@ -94,7 +93,7 @@ def _explanations(foretold: FloatArray) -> Iterator[tuple[str, FloatArray]]:
         )
     for one, two in combinations(range(PHASES), 2):
         shown = foretold.copy()
-        shown[[one, two]] = foretold[[two, one]]
+        shown[:, [one, two]] = foretold[:, [two, one]]
         yield (
             f'{PHASE_NAMES[one]} and {PHASE_NAMES[two]} are exchanged: exchange elements {one} and '
             f'{two} of amplifier.board and of amplifier.channel',
@@ -102,7 +101,7 @@ def _explanations(foretold: FloatArray) -> Iterator[tuple[str, FloatArray]]:
         )
     for one, two in combinations(range(ENCODERS), 2):
         shown = foretold.copy()
-        shown[:, :, [one, two]] = foretold[:, :, [two, one]]
+        shown[..., [one, two]] = foretold[..., [two, one]]
         yield (
             f'encoders {ENCODER_NAMES[one]} and {ENCODER_NAMES[two]} are exchanged: exchange '
             f'elements {one} and {two} of encoder.board and of encoder.channel',

@@ -2,8 +2,8 @@
 
 One phase at a time gets a slowly rising current, one way and the other, until an encoder has seen
 enough. With the wiring that the parameters claim, the emulated machine foretells every encoder's
-answer; which single error would explain what was seen instead is found in
-:mod:`maglev_hw_bridge.diagnosis`.
+answer, with several frictions, as the machine's own is not known yet. Which single error would
+explain what was seen instead is found in :mod:`maglev_hw_bridge.diagnosis`.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ _GAP_ENOUGH = 3e-4  # [m]
 _HORIZONTAL_ENOUGH = 4e-3  # [m]
 _QUIET = 0.05  # without a count, then the platen rests [s]
 _LONGEST_WAIT = 3.0  # for that [s]
+_FRICTIONS = ((1.0, 1.0), (0.6, 0.6), (0.6, 1.5), (1.5, 0.6), (1.5, 1.5))  # x and z, tilts
 
 
 class Pulses:
@@ -92,9 +93,29 @@ class Pulses:
         return np.array(self._encoders.arrays.length[4:])
 
 
-class Twin:
-    """The emulated machine, wired as the parameters claim."""
+class Twins:
+    """The emulated machine, wired as the parameters claim, with less and more guide friction."""
 
+    def __init__(self, parameters: BridgeParameters, peak: float) -> None:
+        """``peak``: largest phase current [A]."""
+        self._twins = [_Twin(_rubbing(parameters, *factors), peak) for factors in _FRICTIONS]
+
+    def phase(self, phase: int, place: FloatArray) -> FloatArray:
+        """What the encoders should see of one phase, (5, 2, 6) [m], from ``place``: x, z [m]."""
+        return np.array([twin.phase(phase, place) for twin in self._twins])
+
+
+def _rubbing(parameters: BridgeParameters, horizontal: float, tilt: float) -> BridgeParameters:
+    guide = parameters.emulation.guide
+    factors = (1.0, horizontal, horizontal, tilt, tilt)
+    coulomb = tuple(f * force for f, force in zip(factors, guide.coulomb, strict=True))
+    emulation = dataclasses.replace(
+        parameters.emulation, guide=dataclasses.replace(guide, coulomb=coulomb)
+    )
+    return dataclasses.replace(parameters, emulation=emulation)
+
+
+class _Twin:
     def __init__(self, parameters: BridgeParameters, peak: float) -> None:
         amplifier, encoder = parameters.amplifier, parameters.encoder
         wiring = dataclasses.replace(
@@ -119,7 +140,6 @@ class Twin:
         self._pulses = Pulses(twin, driver, Encoders(twin), peak)
 
     def phase(self, phase: int, place: FloatArray) -> FloatArray:
-        """What the encoders should see of one phase, (2, 6) [m], from ``place``: x, z [m]."""
         self._boards.rig.place(np.array([self._rest, place[0], place[1], 0.0, 0.0]))
         self._boards.rig.arrays.current[:] = 0.0
         self._boards.tick()
