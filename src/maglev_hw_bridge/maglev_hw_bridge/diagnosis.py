@@ -29,9 +29,9 @@ class Finding(NamedTuple):
 def diagnose(seen: FloatArray, foretold: FloatArray) -> Finding:
     """Judge what was seen, (12, 2, 6) [m], by what the parameters' wiring would show.
 
-    Indices: phase, the current's sign (+, -), encoder. ``foretold``, (n, 12, 2, 6) [m], has n guesses
-    at the machine before them: every explanation gets the one that suits it best, and the first is
-    the likeliest.
+    Indices: phase, the current's sign (+, -), encoder. ``foretold``, (n, 12, 2, 6) [m], has n
+    guesses at the machine before them: every explanation gets the one that suits it best, and the
+    first is the likeliest.
     """
     silent = _silent(seen, foretold[0])
     if silent:
