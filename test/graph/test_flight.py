@@ -158,8 +158,7 @@ def test_real_time(nodes: Nodes, watching: Observer) -> None:
     assert graph['reference'].wait() == 0, graph['reference'].output
     assert graph['controller'].running
     assert graph['plant'].running, graph['plant'].output
-    # The mean: a desktop that stops for 20 ms leaves a short error of its own.
-    assert np.max(np.mean(np.abs(tracking_errors(watching)), axis=0)) < 100e-6
+    assert np.max(np.abs(tracking_errors(watching))) < 100e-6
     measurements = watching.look()[MEASUREMENT]
     wall = measurements[-1].header.stamp.sec - measurements[0].header.stamp.sec
     assert wall == pytest.approx(len(measurements) * 1e-3, abs=2.0)
@@ -210,9 +209,9 @@ def test_retuning_in_flight_is_checked_and_bumpless(
         if message.sequence > after - 3000 and message.mode == ControllerState.REGULATING
     ]
     assert tracking[-1].sequence > after - 5, graph['controller'].output
-    # In real time the parameter service itself, and the desktop, hold the loop up for some samples.
-    largest = {'lockstep': np.max, 'realtime': np.mean}[mode]
-    assert largest(np.abs([message.error[:3] for message in tracking])) < 50e-6
+    # In real time the parameter service itself holds the loop up for some samples.
+    bound = {'lockstep': 50e-6, 'realtime': 500e-6}[mode]
+    assert np.max(np.abs([message.error[:3] for message in tracking])) < bound
     assert 'currents cut' not in graph['plant'].output
 
 
