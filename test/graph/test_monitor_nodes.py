@@ -8,10 +8,13 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from bag_player import decoded, information, play
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from graph import Nodes, Observer, Process
 from made_up_run import TOPICS, Encoder, Run, make_run
+from rclpy.duration import Duration
 from rosbags.rosbag2 import Reader
 
 from maglev_monitor.analysis import analyse
@@ -59,6 +62,18 @@ class Feeder:
                 publisher.publish(self._messages[key][n])
             if n % 5 == 0:
                 time.sleep(0.001)
+
+    def delivered(self, seconds: float) -> bool:
+        """Whether every reader says within this time that it has everything."""
+        return all(
+            publisher.wait_for_all_acked(Duration(seconds=seconds))
+            for publisher in self._publishers.values()
+        )
+
+    def leave(self) -> None:
+        """Publish no more, so that another may."""
+        for publisher in self._publishers.values():
+            self._node.destroy_publisher(publisher)
 
     def diagnose(self, level: bytes, name: str, text: str) -> None:
         """Publish one status on /diagnostics."""
@@ -114,6 +129,37 @@ def test_bag_and_live_run_give_the_same_figures(
     with Reader(bag) as reader:
         sampled: list[Any] = [c.ext for c in reader.connections if c.topic in SAMPLE_TOPICS]
         assert all(e.offered_qos_profiles[0].reliability.name == 'RELIABLE' for e in sampled)
+
+
+def test_others_read_and_play_a_bag(
+    nodes: Nodes, observer: Observer, feeder: Feeder, run: Run
+) -> None:
+    bag = nodes.folder / 'bag'
+    recorder = nodes.start('recorder', f'output:={bag}', params=('monitor.yaml',))
+    feeder.wait_for(1)
+    feeder.feed()
+    assert feeder.delivered(0.5), 'what is lost would come again only seconds later'
+    observer.wait(lambda: sum(recorded(bag).values()) == 5 * SAMPLES)
+    recorder.signal(signal.SIGINT)
+    assert recorder.wait() == 130
+
+    topics = {
+        topic['topic_metadata']['name']: topic
+        for topic in information(bag)['topics_with_message_count']
+    }
+    messages = decoded(bag)
+    for topic, message_type in TOPICS.values():
+        assert topics[topic]['topic_metadata']['type'] == message_type
+        assert topics[topic]['message_count'] == len(messages[topic]) == SAMPLES
+    states = np.array([message.state for message in messages['/stage/true_state']])
+    np.testing.assert_array_equal(states[:, ::2], run.position)
+
+    feeder.leave()
+    monitor = start_monitor(nodes)
+    play(bag, observer.node)
+    assert monitor.wait() == 0, monitor.output
+    played = metrics(nodes)
+    assert played == analyse(bag).result | {'limits': played['limits']}
 
 
 def test_a_run_that_is_broken_off_leaves_what_there_was(
