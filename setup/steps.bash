@@ -76,13 +76,15 @@ explain() { # TITLE OUTPUT
   fail "$1 failed: $cause; then run again"
 }
 
-# pip of the environment, untouched by the caller's own pip targets and python path.
+# pip of the environment, untouched by the caller's own pip targets and python path. Most modules
+# are never used: those that are, are compiled when they are (see warm_up).
 pip_install() {
   env -u PYTHONPATH -u PYTHONHOME -u PIP_TARGET -u PIP_PREFIX -u PIP_USER \
     -u PIP_REQUIRE_VIRTUALENV PIP_DISABLE_PIP_VERSION_CHECK=1 \
     _ROS_WHEELS_BOOTSTRAP_COMPLETE=1 PYTHONNOUSERSITE=1 \
     bash -c "${ros_setup:+. $ros_setup; } exec \"\$@\"" - \
-    "$venv/bin/python" -m pip install --no-input --progress-bar off --retries 2 "$@"
+    "$venv/bin/python" -m pip install --no-input --no-compile --progress-bar off \
+    --retries 2 "$@"
 }
 
 # The message modules of an installed ROS are compiled against the NumPy it came with: pin that one.
@@ -215,9 +217,12 @@ in_environment() {
     bash -c ". '$root/install/environment.bash' && exec \"\$@\"" - "$@"
 }
 
-# Fill the cache of compiled functions, so that the first run starts as quickly as the second. Only
-# that depends on it, so a defect of the code is left for a run or the tests to show.
+# Fill the caches of compiled functions and modules, so that the first run starts as quickly as the
+# second. Only that depends on it, so a defect of the code is left for a run or the tests to show.
 warm_up() {
-  in_environment python -c 'import maglev_controller.closed_loop as loop; loop.warm_up()' ||
+  in_environment python -c 'import maglev_controller.closed_loop as loop
+import maglev_controller.node, maglev_hw_bridge.node, maglev_plant.node, maglev_reference.node
+import maglev_monitor.analyze, maglev_monitor.node, maglev_monitor.recorder, maglev_monitor.report
+loop.warm_up()' ||
     echo 'not compiled'
 }
