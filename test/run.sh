@@ -51,6 +51,7 @@ end_started() {
 
 finish() {
   trap '' INT TERM HUP
+  [[ -z $style_job ]] || kill -- "-$style_job" 2>/dev/null || true
   end_started
   rm -rf -- "$TMPDIR"
 }
@@ -77,6 +78,7 @@ check_style() {
   return "$failed"
 }
 
+style_job=''
 take_domain
 TMPDIR=$(mktemp -d "${TMPDIR:-/tmp}/maglev-test.XXXXXX")
 export TMPDIR MAGLEV_TEST_RUN=$TMPDIR ROS_LOG_DIR=$TMPDIR/ros
@@ -92,11 +94,14 @@ guard &
 set +m
 before=$(tree_state)
 
-style=passed
-check_style || style=failed
+# In the background, so that a signal to this shell is seen at once; as jobs, so that the tests' own
+# processes do not inherit an ignored SIGINT.
+set -m
+check_style >"$TMPDIR/style" 2>&1 8>&- &
+style_job=$!
+set +m
 
-# In the background, so that a signal to this shell is seen at once; as a job, so that the tests'
-# own processes do not inherit an ignored SIGINT. Plugins: only ours, whatever else the machine has.
+# Plugins: only ours, whatever else the machine has.
 bound=()
 ! command -v setpriv >/dev/null || bound=(setpriv --pdeathsig TERM)
 export PYTEST_DISABLE_PLUGIN_AUTOLOAD=1
@@ -105,6 +110,10 @@ set -m
 "${bound[@]}" python -m pytest -p hypothesispytest "$@" 8>&- &
 set +m
 wait $! || code=$?
+style=passed
+wait "$style_job" || style=failed
+style_job=''
+cat -- "$TMPDIR/style"
 end_started
 
 if [[ $style == failed ]]; then
