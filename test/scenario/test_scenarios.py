@@ -79,11 +79,11 @@ def marked_processes(mark: str) -> list[str]:
 def test_ellipse_leaves_a_run_and_repeats_bit_for_bit(tmp_path: Path) -> None:
     outs = tmp_path / 'first', tmp_path / 'second'
     for out in outs:
-        done = run('ellipse_4dof', out, '--duration', '4', '--params', soon(tmp_path))
+        done = run('ellipse_4dof', out, '--duration', '2', '--params', soon(tmp_path))
         assert done.returncode == 0
         assert 'verdict: pass' in done.stdout
     figures = metrics(outs[0])
-    assert figures['samples'] == 4000
+    assert figures['samples'] == 2000
     assert figures['missing_samples'] == 0
     assert figures['error_source'] == 'true'
     for axis in ('y', 'x', 'z'):
@@ -109,7 +109,7 @@ def test_ellipse_leaves_a_run_and_repeats_bit_for_bit(tmp_path: Path) -> None:
 def test_the_paper_on_its_own_model(tmp_path: Path) -> None:
     chosen = tmp_path / 'chosen.yaml'
     chosen.write_text(
-        'reference: {ros__parameters: {duration: 4.0, steps: {'
+        'reference: {ros__parameters: {duration: 3.2, steps: {'
         "axis: ['y', 'theta', 'x'], start: [0.02, 0.0, 0.0], target: [0.027, 0.01, 0.03]}}}\n"
         'monitor: {ros__parameters: {limits: {min_steps: 3}}}\n'
     )
