@@ -15,6 +15,7 @@ FloatArray = NDArray[np.float64]
 CountArray = NDArray[np.int32]
 
 _HALF = 2**31
+_DOUBT = 5e-4  # how far beyond the stops an encoder may read before it is disbelieved [m]
 
 
 class HomingError(RuntimeError):
@@ -49,9 +50,11 @@ class Encoders:
     """Six incremental encoders; :attr:`arrays` serve compiled code."""
 
     def __init__(self, parameters: BridgeParameters) -> None:
-        encoder = parameters.encoder
+        encoder, machine, fault = parameters.encoder, parameters.machine, parameters.fault
+        self._lower = np.array([fault.gap_lower] * 4 + [-machine.x_max, -machine.z_max])
+        self._upper = np.array([fault.gap_upper] * 4 + [machine.x_max, machine.z_max])
         self._homing = parameters.homing
-        self._rest = parameters.machine.gap_max
+        self._rest = machine.gap_max
         self.homed = False
         self.arrays = EncoderArrays(
             scale=np.array(encoder.resolution) * np.array(encoder.direction),
@@ -71,6 +74,15 @@ class Encoders:
         """Lengths [m] of gaps 1..4, x, z, shape (6,); the same array at each call."""
         decode(self.arrays, counts)
         return self.arrays.length
+
+    def beyond_stops(self) -> str:
+        """Which encoder reads what the stops do not let the platen be; empty: none."""
+        length = self.arrays.length
+        wrong = np.flatnonzero((length < self._lower - _DOUBT) | (length > self._upper + _DOUBT))
+        if not len(wrong):
+            return ''
+        name, value = ENCODER_NAMES[wrong[0]], length[wrong[0]]
+        return f'encoder {name} reads {value * 1e3:.2f} mm, beyond the stops'
 
     def home(self, readings: NDArray[np.int32]) -> FloatArray:
         """Define the zeros from readings (n, 6) of a platen at rest in its home position.

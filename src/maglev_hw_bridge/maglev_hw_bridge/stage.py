@@ -22,12 +22,11 @@ from maglev_hw_bridge.faults import Fault, command_fault, encoder_fault, range_f
 from maglev_hw_bridge.guard import Guard
 from maglev_hw_bridge.landing import Landing, impact_of_cut
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_hw_bridge.signal_parameters import ENCODER_NAMES
-from maglev_node.stage import EncoderSample, StageError
+from maglev_node.parameters import build
+from maglev_node.stage import EncoderSample, StageError, motor_currents
 
 FloatArray = NDArray[np.float64]
 
-_DOUBT = 5e-4  # how far beyond the stops an encoder may read before it is disbelieved [m]
 _ON_THE_STOP = 2e-4  # this near the lower stop the platen rests [m]
 
 
@@ -133,17 +132,10 @@ class BridgeStage:
     def _check_encoders(self) -> None:
         """Refuse encoders that read what the stops do not let the platen be."""
         self._peek(self._counts)
-        length = self.encoders.decode(self._counts)
-        machine = self.parameters.machine
-        gap = self.parameters.fault
-        lower = np.array([gap.gap_lower] * 4 + [-machine.x_max, -machine.z_max])
-        upper = np.array([gap.gap_upper] * 4 + [machine.x_max, machine.z_max])
-        wrong = np.flatnonzero((length < lower - _DOUBT) | (length > upper + _DOUBT))
-        if len(wrong):
-            name, value = ENCODER_NAMES[wrong[0]], length[wrong[0]]
-            raise StageError(
-                f'encoder {name} reads {value * 1e3:.2f} mm, beyond the stops: home first (~/home)'
-            )
+        self.encoders.decode(self._counts)
+        beyond = self.encoders.beyond_stops()
+        if beyond:
+            raise StageError(f'{beyond}: home first (~/home)')
 
     def deactivate(self) -> None:
         """Disable the amplifiers and the watchdog; :meth:`land` first. Raises StageError."""
@@ -220,7 +212,8 @@ class BridgeStage:
         Raises ValueError when a shape is wrong or a current is not finite or too large (the bridge
         then lands), StageError when the boards are lost.
         """
-        i_d, i_q = _four(direct_current), _four(quadrature_current)
+        i_d = motor_currents('direct_current', direct_current)
+        i_q = motor_currents('quadrature_current', quadrature_current)
         self._age = 0
         refused = ''
         if self.mode is Mode.FOLLOWING:
@@ -407,15 +400,6 @@ class BridgeStage:
         self._flying = False
 
 
-def _four(value: Any) -> FloatArray:
-    if type(value) is np.ndarray and value.dtype == np.float64 and value.shape == (4,):
-        return value
-    array = np.ascontiguousarray(value, dtype=np.float64)
-    if array.shape != (4,):
-        raise ValueError(f'currents must have shape (4,), one per motor, not {array.shape}')
-    return array
-
-
 def open_stage(
     parameters: BridgeParameters, *, realtime: bool = False, driver: Driver | None = None
 ) -> BridgeStage:
@@ -424,3 +408,11 @@ def open_stage(
     stage.configure()
     stage.activate()
     return stage
+
+
+def warm_up() -> None:
+    """Compile all that a sample needs, of the emulated boards too, or load it from the cache."""
+    stage = open_stage(build(BridgeParameters, {'homing.at_start': True}))
+    stage.read()
+    stage.hold()
+    stage.close()

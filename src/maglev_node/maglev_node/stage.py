@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,3 +36,19 @@ class Stage(Protocol):
     def close(self) -> None:
         """Release everything with no current flowing; may be called twice."""
         ...
+
+
+def motor_currents(name: str, value: Any) -> FloatArray:
+    """Currents of motors 1..4 [A] as a contiguous array (4,); the same one where it is that.
+
+    Raises ValueError, with ``name`` in it, for what is not four numbers.
+    """
+    if type(value) is np.ndarray and value.dtype == np.float64 and value.shape == (4,):
+        return value
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f'{name} must be four numbers [A], not {value!r}') from error
+    if array.shape != (4,):
+        raise ValueError(f'{name} must have shape (4,), one current per motor, not {array.shape}')
+    return np.ascontiguousarray(array)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from maglev_node.stage import EncoderSample
+from maglev_node.stage import EncoderSample, motor_currents
 from maglev_plant.arrays import (
     FLOWING,
     LOAD,
@@ -122,8 +122,8 @@ class SimulatedStage:
         Raises ValueError, and holds what was written before, when a shape is wrong or a current is
         not finite.
         """
-        i_d = _currents(_DIRECT, direct_current)
-        i_q = _currents(_QUADRATURE, quadrature_current)
+        i_d = motor_currents(_DIRECT, direct_current)
+        i_q = motor_currents(_QUADRATURE, quadrature_current)
         if not _hold(i_d, i_q, self._arrays.command):
             raise ValueError(_not_finite(i_d, i_q))
 
@@ -136,18 +136,6 @@ class SimulatedStage:
     def close(self) -> None:
         """Take the currents away."""
         self._arrays.command[:] = 0.0
-
-
-def _currents(name: str, value: Any) -> NDArray[np.float64]:
-    if type(value) is np.ndarray and value.dtype == np.float64 and value.shape == (4,):
-        return value
-    try:
-        array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f'{name} must be four numbers [A], not {value!r}') from error
-    if array.shape != (4,):
-        raise ValueError(f'{name} must have shape (4,), one current per motor, not {array.shape}')
-    return np.ascontiguousarray(array)
 
 
 def _not_finite(i_d: FloatArray, i_q: FloatArray) -> str:
