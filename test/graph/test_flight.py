@@ -18,11 +18,14 @@ WATCHED = 'watchers:=1'  # by the test
 LOWER_STOP = 0.031
 
 
-def fly(nodes: Nodes, *arguments: str, mode: str = 'lockstep') -> dict[str, Process]:
+def fly(
+    nodes: Nodes, *arguments: str, mode: str = 'lockstep', answer_timeout: float = 5.0
+) -> dict[str, Process]:
     """Start plant, controller and reference on the ellipse."""
+    patience = f'answer_timeout:={answer_timeout}'
     return {
         'plant': nodes.start(
-            'plant', f'mode:={mode}', WATCHED, 'answer_timeout:=2.0', params=('benchmark.yaml',)
+            'plant', f'mode:={mode}', WATCHED, patience, params=('benchmark.yaml',)
         ),
         'controller': nodes.start('controller', f'mode:={mode}', WATCHED),
         'reference': nodes.start(
@@ -128,7 +131,7 @@ def test_disabled_it_lands_enabled_it_flies_again(nodes: Nodes, watching: Observ
 
 
 def test_without_its_controller_the_plant_says_so(nodes: Nodes, watching: Observer) -> None:
-    graph = fly(nodes, LONG, 'timeout:=3.0')
+    graph = fly(nodes, LONG, 'timeout:=3.0', answer_timeout=2.0)
     watching.wait(lambda: airborne(watching))
     graph['controller'].kill()
     assert graph['plant'].wait() == 1
