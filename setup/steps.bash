@@ -175,7 +175,6 @@ END
     setting PYTHONNOUSERSITE 1
     printf 'export NUMBA_CACHE_DIR=%q"/$(<%q)"\n' "$cache/numba" "$cache/numba/current"
     default ROS_AUTOMATIC_DISCOVERY_RANGE LOCALHOST
-    default FASTRTPS_DEFAULT_PROFILES_FILE "$root/setup/fastdds.xml"
     default OPENBLAS_NUM_THREADS 1
     default OMP_NUM_THREADS 1
     echo 'unset -f __maglev_first'

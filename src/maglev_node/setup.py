@@ -6,6 +6,7 @@ setup(
     name=package,
     version='0.1.0',
     packages=find_packages(),
+    package_data={package: ['fastdds.xml']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{package}']),
         (f'share/{package}', ['package.xml']),
