@@ -79,7 +79,7 @@ check_wheels_machine() {
 
 # Sets python, the path of an interpreter that can carry the environment, and python_version.
 check_python() {
-  local name answer best='missing no Python'
+  local name answer best='missing this machine has no Python'
   local names=(python3 python3.12 python3.11 python3.13 python3.10)
   [[ $1 == wheels ]] || names=(python3 /usr/bin/python3)
   for name in "${names[@]}"; do
