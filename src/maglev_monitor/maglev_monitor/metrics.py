@@ -71,6 +71,7 @@ class RunMetrics:
         self._run_rows = 0
         self._seen = dict.fromkeys(TOPIC_TYPES, 0)
         self._missing = dict.fromkeys(TOPIC_TYPES, 0)
+        self._unreferenced = 0  # rows since the last one with a reference
         self._tracking = _Tracking()
         self._measured_samples = 0
         self._steps: list[StepTracker] = []
@@ -144,11 +145,14 @@ class RunMetrics:
         return {**found, **verdict(found, run.limits, complete=self.ended)}
 
     def _missing_result(self) -> dict[str, Any]:
+        """By topic; a landing after a reference that was ended is no loss of the reference."""
         by_topic = {
             key: count
             for key, count in self._missing.items()
             if self._seen[key] or key not in _OPTIONAL
         }
+        if self._seen['reference'] and not self.ended:
+            by_topic['reference'] -= self._unreferenced
         return {'missing_samples': sum(by_topic.values()), 'missing_by_topic': by_topic}
 
     def _fault_result(self) -> list[str]:
@@ -169,6 +173,7 @@ class RunMetrics:
 
     def _skip(self, rows: int) -> None:
         self._run_rows += rows
+        self._unreferenced += rows
         for key in self._missing:
             self._missing[key] += rows
 
@@ -178,6 +183,7 @@ class RunMetrics:
             present = int(np.count_nonzero(rows[f'has_{key}']))
             self._seen[key] += present
             self._missing[key] += len(rows) - present
+        self._count_unreferenced(rows['has_reference'])
         position = positions(rows, self._settings.radius)
         referenced = rows['has_reference']
         measured = referenced & np.isin(phases, (Phase.TRACK, Phase.STEP))
@@ -187,6 +193,13 @@ class RunMetrics:
         self._add_segments(rows[referenced], position[referenced])
         self._currents.add(rows)
         self._timing.add(rows)
+
+    def _count_unreferenced(self, present: NDArray[np.bool_]) -> None:
+        with_reference = np.flatnonzero(present)
+        if len(with_reference):
+            self._unreferenced = len(present) - 1 - int(with_reference[-1])
+        else:
+            self._unreferenced += len(present)
 
     def _add_segments(self, rows: Records, position: FloatArray) -> None:
         """Follow the set-points and feed the steps between them."""

@@ -158,6 +158,18 @@ def test_a_run_without_end_is_incomplete(run: Any, records: dict[str, Records]) 
     assert 'the run did not reach its end' in found['reasons']
 
 
+@pytest.mark.parametrize('lost', [(), (600,), (600, 799)])
+def test_a_landing_after_the_reference_was_ended_is_no_loss(
+    lost: tuple[int, ...], records: dict[str, Records]
+) -> None:
+    kept = {key: part[:1000] for key, part in records.items()}
+    reference = kept['reference'][:801]
+    kept['reference'] = reference[~np.isin(reference['sequence'], lost)]
+    found = figures(kept, burst=50)
+    assert found['missing_by_topic'] == dict.fromkeys(kept, 0) | {'reference': len(lost)}
+    assert found['reasons'][-1] == 'the run did not reach its end'
+
+
 def test_what_comes_after_the_end_changes_nothing(records: dict[str, Records]) -> None:
     end = int(np.flatnonzero(records['reference']['phase'] == Phase.END)[0])
     shorter = {key: part[: end + 1] for key, part in records.items()}
