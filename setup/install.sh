@@ -24,7 +24,7 @@ find_keys() {
   local sums
   shopt -s nullglob
   cd "$root"
-  sums=$(sha256sum setup/{requirements,constraints}*.txt | sha256sum)
+  sums=$(sha256sum setup/{requirements{,-build,-ros},constraints-ros}.txt | sha256sum)
   environment_key="1 $branch $ros_prefix $root ${sums%% *}"
   sums=$(sha256sum setup/*.bash src/*/{package.xml,CMakeLists.txt,setup.{py,cfg}} \
     src/*/{msg,srv}/* | sha256sum)

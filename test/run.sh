@@ -102,14 +102,26 @@ style_job=$!
 set +m
 
 # Plugins: only ours, whatever else the machine has.
+export PYTEST_DISABLE_PLUGIN_AUTOLOAD=1
 bound=()
 ! command -v setpriv >/dev/null || bound=(setpriv --pdeathsig TERM)
-export PYTEST_DISABLE_PLUGIN_AUTOLOAD=1
+
+run_pytest() { # ARGUMENT...
+  set -m
+  "${bound[@]}" python -m pytest -p hypothesispytest "$@" 8>&- &
+  set +m
+  wait $!
+}
+
 code=0
-set -m
-"${bound[@]}" python -m pytest -p hypothesispytest "$@" 8>&- &
-set +m
-wait $! || code=$?
+if (($#)); then
+  run_pytest "$@" || code=$?
+else
+  # Mathematics and libraries side by side; then, with the machine to themselves, the nodes.
+  run_pytest -p xdist -n logical --maxprocesses 4 --dist loadfile test/unit test/hardware ||
+    code=$?
+  run_pytest test/graph test/scenario || code=$?
+fi
 style=passed
 wait "$style_job" || style=failed
 style_job=''

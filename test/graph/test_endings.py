@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import signal
 import time
@@ -49,3 +50,18 @@ def test_no_shared_memory_stays(
     node.signal(number)
     assert node.wait() == 128 + number, node.output
     assert not [path for path in held if path.exists()]
+
+
+def test_what_a_killed_process_has_locked_keeps_no_node_from_coming_up(nodes: Nodes) -> None:
+    if get_rmw_implementation_identifier() != 'rmw_fastrtps_cpp':
+        pytest.skip('only Fast DDS locks ports in shared memory')
+    first = 7400 + 250 * int(os.environ['ROS_DOMAIN_ID'])
+    locks = [Path(f'/dev/shm/sem.fastrtps_port{first + offset}_mutex') for offset in (11, 13, 15)]
+    for lock in locks:  # as a process leaves them that is killed while it makes the port
+        lock.write_bytes(bytes(8) + b'\x80' + bytes(23))
+        lock.with_name(lock.name[4:-6]).write_bytes(b'')
+    recorder = nodes.start('recorder', f'output:={nodes.folder / "bag"}')
+    recorder.wait_for('recording to', timeout=15.0)
+    recorder.signal(signal.SIGINT)
+    assert recorder.wait() == 130
+    assert all(not lock.exists() or lock.read_bytes()[0] == 1 for lock in locks)

@@ -23,8 +23,6 @@ from maglev_node.topics import (
     sample_qos,
 )
 
-pytestmark = pytest.mark.graph
-
 LOWER_STOP = 0.031
 FILES = {'plant': ('benchmark.yaml',), 'hw_bridge': ('hw_bridge.yaml',)}
 ELLIPSE = 'scenario_ellipse.yaml'

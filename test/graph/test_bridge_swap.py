@@ -10,8 +10,6 @@ from graph import Nodes, Observer
 from maglev_msgs.msg import Reference
 from maglev_node.topics import REFERENCE, SAMPLE_TOPICS, TRUE_STATE
 
-pytestmark = pytest.mark.graph
-
 
 def test_land_swap_lift_off(nodes: Nodes, observer: Observer) -> None:
     observer.watch(*SAMPLE_TOPICS)
