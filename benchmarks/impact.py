@@ -15,9 +15,10 @@ import numpy as np
 
 from maglev_hw_bridge.drivers.emulated import EmulatedDriver
 from maglev_hw_bridge.landing import currents, impact_of_cut
+from maglev_hw_bridge.opening import open_stage
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES
-from maglev_hw_bridge.stage import BridgeStage, Mode, open_stage
+from maglev_hw_bridge.stage import BridgeStage, Mode
 from maglev_node.parameters import build
 
 SOFT = 0.05  # [m/s]

@@ -219,8 +219,8 @@ in_environment() {
 # Fill the caches of compiled functions and modules, so that the first run starts as quickly as the
 # second. Only that depends on it, so a defect of the code is left for a run or the tests to show.
 warm_up() {
-  in_environment python -c 'import maglev_hw_bridge.node, maglev_hw_bridge.stage as stage
-stage.warm_up()' &
+  in_environment python -c 'import maglev_hw_bridge.node, maglev_hw_bridge.opening as bridge
+bridge.warm_up()' &
   in_environment python -c 'import maglev_controller.closed_loop as loop
 import maglev_controller.node, maglev_plant.node, maglev_reference.node
 import maglev_monitor.analyze, maglev_monitor.node, maglev_monitor.recorder, maglev_monitor.report

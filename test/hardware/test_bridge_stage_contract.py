@@ -11,8 +11,8 @@ from bridge_flight import HOME
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
+from maglev_hw_bridge.opening import open_stage
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_hw_bridge.stage import open_stage
 from maglev_node.parameters import build
 from maglev_node.stage import EncoderSample, Stage
 from maglev_plant.parameters import PlantParameters

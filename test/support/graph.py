@@ -19,7 +19,7 @@ from rclpy.parameter import Parameter
 from rclpy.task import Future
 from std_srvs.srv import SetBool, Trigger
 
-from maglev_node.dds import prepare
+from maglev_node.dds import prepare_middleware
 from maglev_node.polling import PolledSubscription, Queues
 from maglev_node.topics import SAMPLE_TOPICS
 
@@ -107,7 +107,7 @@ class Observer:
     """A node of the test's own that keeps every message of the sample topics it watches."""
 
     def __init__(self) -> None:
-        prepare()
+        prepare_middleware()
         self._context = rclpy.Context()
         self._context.init()
         self.node = rclpy.create_node('observer', context=self._context)

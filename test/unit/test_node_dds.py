@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from maglev_node.dds import prepare
+from maglev_node.dds import prepare_middleware
 
 VARIABLE = 'FASTRTPS_DEFAULT_PROFILES_FILE'
 
@@ -16,12 +16,12 @@ VARIABLE = 'FASTRTPS_DEFAULT_PROFILES_FILE'
 def test_ours_by_default(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(VARIABLE, '')  # so that it is put back
     monkeypatch.delenv(VARIABLE)
-    prepare()
+    prepare_middleware()
     profiles = ElementTree.parse(os.environ[VARIABLE]).getroot()
     assert [child.get('is_default_profile') for child in profiles] == ['true', 'true']
 
 
 def test_what_the_user_chose_stays(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv(VARIABLE, str(tmp_path / 'own.xml'))
-    prepare()
+    prepare_middleware()
     assert os.environ[VARIABLE] == str(tmp_path / 'own.xml')

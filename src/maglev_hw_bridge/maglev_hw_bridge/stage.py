@@ -22,7 +22,6 @@ from maglev_hw_bridge.faults import Fault, command_fault, encoder_fault, range_f
 from maglev_hw_bridge.guard import Guard
 from maglev_hw_bridge.landing import Landing, impact_of_cut
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_node.parameters import build
 from maglev_node.stage import EncoderSample, StageError, motor_currents
 
 FloatArray = NDArray[np.float64]
@@ -82,18 +81,14 @@ class BridgeStage:
 
     def _warm_up(self) -> None:
         """Compile, or load what was compiled, before a sample asks for it."""
-        y = self._lower_stop
+        y, rate = self._lower_stop, np.zeros(5)
         self.guard.watch(np.array([y, y, y, y, 0.0, 0.0]), True)
-        self.landing.begin(self.guard.arrays.position, self._zero_rate())
-        self.landing.step(self.guard.arrays.position, self._zero_rate())
+        self.landing.begin(self.guard.arrays.position, rate)
+        self.landing.step(self.guard.arrays.position, rate)
         self.encoders.decode(self._counts)
         self.amplifiers.drive(self._zero, self._zero, 0.0, 0.0)
         impact_of_cut(self.parameters, y - 1e-4, 0.0)
         self.guard.forget()
-
-    @staticmethod
-    def _zero_rate() -> FloatArray:
-        return np.zeros(5)
 
     # -- states ------------------------------------------------------------------------------------
 
@@ -398,21 +393,3 @@ class BridgeStage:
         self.driver.close()
         self.mode = Mode.LOST
         self._flying = False
-
-
-def open_stage(
-    parameters: BridgeParameters, *, realtime: bool = False, driver: Driver | None = None
-) -> BridgeStage:
-    """A stage that is configured and active. Raises StageError, ParameterError."""
-    stage = BridgeStage(parameters, realtime=realtime, driver=driver)
-    stage.configure()
-    stage.activate()
-    return stage
-
-
-def warm_up() -> None:
-    """Compile all that a sample needs, of the emulated boards too, or load it from the cache."""
-    stage = open_stage(build(BridgeParameters, {'homing.at_start': True}))
-    stage.read()
-    stage.hold()
-    stage.close()

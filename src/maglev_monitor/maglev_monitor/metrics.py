@@ -71,7 +71,7 @@ class RunMetrics:
         self._run_rows = 0
         self._seen = dict.fromkeys(TOPIC_TYPES, 0)
         self._missing = dict.fromkeys(TOPIC_TYPES, 0)
-        self._unreferenced = 0  # rows since the last one with a reference
+        self._last_reference = -1  # number of the last sample with one
         self._tracking = _Tracking()
         self._measured_samples = 0
         self._steps: list[StepTracker] = []
@@ -152,7 +152,7 @@ class RunMetrics:
             if self._seen[key] or key not in _OPTIONAL
         }
         if self._seen['reference'] and not self.ended:
-            by_topic['reference'] -= self._unreferenced
+            by_topic['reference'] -= self._expected - 1 - self._last_reference
         return {'missing_samples': sum(by_topic.values()), 'missing_by_topic': by_topic}
 
     def _fault_result(self) -> list[str]:
@@ -173,7 +173,6 @@ class RunMetrics:
 
     def _skip(self, rows: int) -> None:
         self._run_rows += rows
-        self._unreferenced += rows
         for key in self._missing:
             self._missing[key] += rows
 
@@ -183,9 +182,10 @@ class RunMetrics:
             present = int(np.count_nonzero(rows[f'has_{key}']))
             self._seen[key] += present
             self._missing[key] += len(rows) - present
-        self._count_unreferenced(rows['has_reference'])
         position = positions(rows, self._settings.radius)
         referenced = rows['has_reference']
+        if np.any(referenced):
+            self._last_reference = int(rows['sequence'][referenced][-1])
         measured = referenced & np.isin(phases, (Phase.TRACK, Phase.STEP))
         self._measured_samples += int(np.count_nonzero(measured))
         tracked = referenced & (phases == Phase.TRACK)
@@ -193,13 +193,6 @@ class RunMetrics:
         self._add_segments(rows[referenced], position[referenced])
         self._currents.add(rows)
         self._timing.add(rows)
-
-    def _count_unreferenced(self, present: NDArray[np.bool_]) -> None:
-        with_reference = np.flatnonzero(present)
-        if len(with_reference):
-            self._unreferenced = len(present) - 1 - int(with_reference[-1])
-        else:
-            self._unreferenced += len(present)
 
     def _add_segments(self, rows: Records, position: FloatArray) -> None:
         """Follow the set-points and feed the steps between them."""

@@ -17,7 +17,7 @@ _FIRST_PORT, _PORTS = 7400, 250  # of domain 0, and of each domain (DDSI-RTPS 9.
 _HELD = 1.0  # a port is opened in far less; a lock held for this long has nobody to undo it [s]
 
 
-def prepare() -> None:
+def prepare_middleware() -> None:
     """Choose the middleware's profile and free what killed processes hold on to.
 
     For Fast DDS, before the process makes its first node; other middleware does not heed it.

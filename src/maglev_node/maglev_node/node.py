@@ -25,7 +25,7 @@ from rclpy.task import Future
 
 from maglev_node import parameters as table
 from maglev_node import ros_parameters
-from maglev_node.dds import prepare
+from maglev_node.dds import prepare_middleware
 from maglev_node.parameters import ParameterError, parameter
 from maglev_node.topics import DIAGNOSTICS
 
@@ -249,7 +249,7 @@ def run(make_node: Callable[[], MaglevNode[Any]], name: str) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda signum, _frame: caught.append(signum))
     node: MaglevNode[Any] | None = None
-    prepare()
+    prepare_middleware()
     try:
         rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
         node = make_node()
