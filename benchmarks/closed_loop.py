@@ -16,16 +16,16 @@ from pathlib import Path
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from maglev_controller.closed_loop import References, run, warm_up
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
-from maglev_node.parameters import build, read_yaml
+from maglev_model.machine import machine_from_array
+from maglev_model.parameters import build, read_yaml
 from maglev_plant.arrays import STATE
 from maglev_plant.dynamics import derivative
 from maglev_plant.encoder import encode
-from maglev_plant.machine import machine_from_array
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
+from maglev_study.closed_loop import References, run, warm_up
 
 REAL_TIME_FACTOR = 100.0
 SCIPY_RATIO = 30.0

@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-from maglev_monitor.bag import Bag
+from maglev_monitor.bag.reader import Bag
 
 ROOT = Path(__file__).parents[1]
 LEVITATING = 0.0309  # the platen is off its stop below this gap [m]

@@ -19,7 +19,7 @@ from maglev_hw_bridge.opening import open_stage
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES
 from maglev_hw_bridge.stage import BridgeStage, Mode
-from maglev_node.parameters import build
+from maglev_model.parameters import build
 
 SOFT = 0.05  # [m/s]
 HEIGHTS = (0.019, 0.020, 0.0225, 0.025, 0.0275, 0.0285, 0.030)  # air gap [m]

@@ -18,14 +18,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from maglev_controller.closed_loop import References, Run, run
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import MeasurementFault, Regulator
-from maglev_node.parameters import build, read_yaml
+from maglev_model.motor import force_coefficients
+from maglev_model.parameters import build, read_yaml
 from maglev_plant.arrays import true_machine
-from maglev_plant.motor import force_coefficients
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
+from maglev_study.closed_loop import References, Run, run
 
 FloatArray = NDArray[np.float64]
 

@@ -32,6 +32,6 @@ done
 
 # shellcheck source=setup.sh
 . "$scenario_root/setup.sh" || exit
-program maglev_controller compare
+program maglev_study compare
 exec "${command[@]}" "${options[@]}" --params "$scenario_root/params" \
   --out "${out:-$scenario_root/runs/compare-$(date +%Y%m%d-%H%M%S)}"

@@ -106,7 +106,7 @@ fly_all() {
 take_options "$@"
 # shellcheck source=setup.sh
 . "$scenario_root/setup.sh" || exit
-program maglev_monitor paper_tables
+program maglev_study paper_tables
 page=("${command[@]}")
 make_folder
 tell "$mode, into $out"

@@ -221,9 +221,9 @@ in_environment() {
 warm_up() {
   in_environment python -c 'import maglev_hw_bridge.node, maglev_hw_bridge.opening as bridge
 bridge.warm_up()' &
-  in_environment python -c 'import maglev_controller.closed_loop as loop
+  in_environment python -c 'import maglev_study.closed_loop as loop
 import maglev_controller.node, maglev_plant.node, maglev_reference.node
-import maglev_monitor.analyze, maglev_monitor.node, maglev_monitor.recorder, maglev_monitor.report
+import maglev_monitor.bag.analyze, maglev_monitor.live.node, maglev_monitor.bag.recorder, maglev_monitor.report.report
 loop.warm_up()' || echo 'not compiled'
   wait $! || echo 'not compiled'
 }

@@ -118,7 +118,7 @@ if (($#)); then
   run_pytest "$@" || code=$?
 else
   # Mathematics and libraries side by side; then, with the machine to themselves, the nodes.
-  run_pytest -p xdist -n logical --maxprocesses 4 --dist loadfile test/unit test/hardware ||
+  run_pytest -p xdist -n logical --maxprocesses 4 --dist loadfile test/model test/plant test/controller test/reference test/node test/monitor test/hw_bridge test/study test/setup ||
     code=$?
   run_pytest test/graph test/scenario || code=$?
 fi

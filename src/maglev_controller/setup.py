@@ -19,7 +19,6 @@ setup(
     entry_points={
         'console_scripts': [
             'controller = maglev_controller.node:main',
-            'compare = maglev_controller.comparison.main:main',
         ]
     },
 )

@@ -18,10 +18,9 @@ setup(
     license='Apache-2.0',
     entry_points={
         'console_scripts': [
-            'monitor = maglev_monitor.node:main',
-            'recorder = maglev_monitor.recorder:main',
-            'analyze = maglev_monitor.analyze:main',
-            'paper_tables = maglev_monitor.paper_tables:main',
+            'monitor = maglev_monitor.live.node:main',
+            'recorder = maglev_monitor.bag.recorder:main',
+            'analyze = maglev_monitor.bag.analyze:main',
         ]
     },
 )

@@ -19,7 +19,6 @@ setup(
     entry_points={
         'console_scripts': [
             'plant = maglev_plant.node:main',
-            'terms = maglev_plant.terms_cli:main',
         ]
     },
 )

@@ -17,8 +17,8 @@ from made_up_run import TOPICS, Encoder, Run, make_run
 from rclpy.duration import Duration
 from rosbags.rosbag2 import Reader
 
-from maglev_monitor.analysis import analyse
-from maglev_monitor.bag import Bag
+from maglev_monitor.bag.analysis import analyse
+from maglev_monitor.bag.reader import Bag
 from maglev_node.stamp import stamp_now
 from maglev_node.topics import SAMPLE_TOPICS, sample_qos
 

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from maglev_monitor.bag_writer import BagWriter
-from maglev_monitor.samples import Phase
+from maglev_model.phases import Phase
+from maglev_monitor.bag.writer import BagWriter
 
 MESSAGES = Path(__file__).parents[2] / 'src' / 'maglev_msgs' / 'msg'
 RADIUS = 0.397

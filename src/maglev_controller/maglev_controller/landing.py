@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maglev_controller.parameters import ControllerParameters
-from maglev_controller.profile import quintic_to_zero
-from maglev_plant.machine import AXES
+from maglev_model.axes import AXES
+from maglev_model.quintic import quintic_to_zero
 
 FloatArray = NDArray[np.float64]
 

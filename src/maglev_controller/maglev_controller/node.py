@@ -11,11 +11,12 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import SetBool, Trigger
 
 from maglev_controller.parameters import ControllerParameters
-from maglev_controller.supervision import Mode, Phase, Supervisor
+from maglev_controller.supervision import Mode, Supervisor
+from maglev_model.parameters import build, parameter, specs, values
+from maglev_model.phases import Phase
 from maglev_msgs.msg import ControllerState, Currents, Measurement, Reference
 from maglev_node.node import MaglevNode, SourceParameters
 from maglev_node.node import main as run_main
-from maglev_node.parameters import build, parameter, specs, values
 from maglev_node.polling import Queues
 from maglev_node.stamp import copy_stamp, stamp_now
 from maglev_node.topics import CONTROLLER_STATE, CURRENTS, MEASUREMENT, REFERENCE, sample_qos

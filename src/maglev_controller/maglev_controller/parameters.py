@@ -8,11 +8,11 @@ from __future__ import annotations
 import dataclasses
 import math
 
-from maglev_node.parameters import group, parameter
-from maglev_plant.machine import MachineParameters
+from maglev_model.machine import MachineParameters
+from maglev_model.parameters import group, parameter
 
 LAWS = (
-    'internal_model',
+    'output_regulator',
     'jacobian_lead_lag',
     'feedback_lead_lag',
     'feedback_soi',
@@ -323,7 +323,7 @@ class ControllerParameters:
         1e-3, unit='s', lower=1e-5, upper=0.1, description='sample time', read_only=True
     )
     law: str = parameter(
-        'internal_model',
+        'output_regulator',
         choices=LAWS,
         description='control law: how e becomes w; maglev_controller.laws tells what each is',
     )

@@ -14,10 +14,10 @@ import sys
 import tempfile
 import time
 
+from maglev_controller.handover import ModelMaps, model_maps
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
-from maglev_controller.retuning import ModelMaps, model_maps
-from maglev_node.parameters import ParameterError
+from maglev_model.parameters import ParameterError
 
 _LONGEST = 20.0  # [s]
 

@@ -15,15 +15,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from maglev_controller import law
-from maglev_controller.design import AxisDesign
-from maglev_controller.law import ControlArrays, control_step
+from maglev_controller import sample_step as law
+from maglev_controller.design.gains import AxisDesign
+from maglev_controller.design.margins import LoopMargins, all_margins, check_margins
+from maglev_controller.design.observer import NO_OBSERVER
+from maglev_controller.handover import ModelMaps, carry_over, check_retuning, model_maps
 from maglev_controller.laws import control_law
-from maglev_controller.margins import LoopMargins, all_margins, check_margins
-from maglev_controller.observer import NO_OBSERVER
 from maglev_controller.parameters import ControllerParameters
-from maglev_controller.retuning import ModelMaps, carry_over, check_retuning, model_maps
-from maglev_plant.machine import AXES, machine_constants, machine_to_array
+from maglev_controller.sample_step import ControlArrays, control_step
+from maglev_model.axes import AXES
+from maglev_model.machine import machine_constants, machine_to_array
 
 FloatArray = NDArray[np.float64]
 
@@ -98,7 +99,7 @@ class Regulator:
     def take_over(self, previous: Regulator, maps: ModelMaps | None = None) -> None:
         """Go on where ``previous`` is, without a jump of w; both designed for the same stage.
 
-        With ``maps``, which :func:`maglev_controller.retuning.model_maps` makes of the two, it is
+        With ``maps``, which :func:`maglev_controller.handover.model_maps` makes of the two, it is
         done within a fraction of a sample.
         """
         if maps is None:

@@ -7,12 +7,13 @@ import enum
 import numpy as np
 from numpy.typing import NDArray
 
+from maglev_controller.handover import ModelMaps, check_retuning
 from maglev_controller.landing import Landing
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.redesign import Redesign
 from maglev_controller.reference_buffer import ReferenceBuffer
 from maglev_controller.regulator import MeasurementFault, Regulator
-from maglev_controller.retuning import ModelMaps, check_retuning
+from maglev_model.phases import Phase
 
 FloatArray = NDArray[np.float64]
 
@@ -25,14 +26,6 @@ class Mode(enum.IntEnum):
     REGULATING = 2
     LANDING = 3  # by itself
     FAULT = 4  # latched, no current
-
-
-class Phase(enum.IntEnum):
-    """The phases of ``Reference`` that matter here."""
-
-    REST = 0
-    STEP = 4
-    END = 6
 
 
 _FLYING_MARGIN = 5e-4  # above the lower stop, beyond encoder and stop compliance [m]

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_plant.commutation import SCALES, phase_currents
-from maglev_plant.compiled import compiled
+from maglev_model.commutation import SCALES, phase_currents
+from maglev_model.compiled import compiled
 
 FloatArray = NDArray[np.float64]
 

@@ -22,8 +22,8 @@ from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.response import Pulses, Twins
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES, PHASE_NAMES, PHASES
 from maglev_hw_bridge.stage import BridgeStage, Mode
-from maglev_node.parameters import ParameterError, from_yaml
-from maglev_node.stage import StageError
+from maglev_model.parameters import ParameterError, from_yaml
+from maglev_model.stage import StageError
 
 FloatArray = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from maglev_node.parameters import group, parameter
+from maglev_model.parameters import group, parameter
 from maglev_plant.parameters import (
     DisturbanceParameters,
     EncoderParameters,

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES
-from maglev_plant.compiled import compiled
+from maglev_model.compiled import compiled
 
 FloatArray = NDArray[np.float64]
 CountArray = NDArray[np.int32]

@@ -11,7 +11,7 @@ from maglev_hw_bridge import amplifiers, guard
 from maglev_hw_bridge.amplifiers import Amplifiers
 from maglev_hw_bridge.guard import Guard
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES, PHASE_NAMES
-from maglev_plant.machine import AXES
+from maglev_model.axes import AXES
 
 FloatArray = NDArray[np.float64]
 

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_plant.compiled import compiled
-from maglev_plant.machine import machine_constants, machine_from_array, machine_to_array
-from maglev_plant.motor import attraction_coefficients
-from maglev_plant.platen import outputs_from_gaps
+from maglev_model.compiled import compiled
+from maglev_model.machine import machine_constants, machine_from_array, machine_to_array
+from maglev_model.motor import attraction_coefficients
+from maglev_model.platen import outputs_from_gaps
 
 FloatArray = NDArray[np.float64]
 

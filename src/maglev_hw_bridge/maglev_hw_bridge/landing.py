@@ -14,15 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_plant.compiled import compiled
-from maglev_plant.machine import (
+from maglev_model.compiled import compiled
+from maglev_model.machine import (
     Machine,
     machine_constants,
     machine_from_array,
     machine_to_array,
 )
-from maglev_plant.motor import attraction_coefficients
-from maglev_plant.platen import gaps_from_outputs, output_accelerations
+from maglev_model.motor import attraction_coefficients
+from maglev_model.platen import gaps_from_outputs, output_accelerations
 
 FloatArray = NDArray[np.float64]
 

@@ -16,10 +16,10 @@ from maglev_hw_bridge.encoders import HomingError
 from maglev_hw_bridge.faults import Fault
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.stage import BridgeStage, Mode
+from maglev_model.parameters import parameter
+from maglev_model.stage import StageError
 from maglev_msgs.msg import PlantState
 from maglev_node.node import main as run_main
-from maglev_node.parameters import parameter
-from maglev_node.stage import StageError
 from maglev_node.stage_node import StageNode, StageNodeParameters
 from maglev_node.stamp import copy_stamp
 from maglev_node.topics import TRUE_STATE, sample_qos

@@ -5,7 +5,7 @@ from __future__ import annotations
 from maglev_hw_bridge.drivers import Driver
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.stage import BridgeStage
-from maglev_node.parameters import build
+from maglev_model.parameters import build
 
 
 def open_stage(

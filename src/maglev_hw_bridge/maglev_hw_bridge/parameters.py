@@ -12,8 +12,8 @@ from maglev_hw_bridge.signal_parameters import (
     EncoderParameters,
     HomingParameters,
 )
-from maglev_node.parameters import ParameterError, group, parameter
-from maglev_plant.machine import MachineParameters
+from maglev_model.machine import MachineParameters
+from maglev_model.parameters import ParameterError, group, parameter
 
 _BY_AXIS = ', by axis y, x, z, phi, theta'
 

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.signal_parameters import check_places, check_signs
-from maglev_node.parameters import ParameterError
+from maglev_model.commutation import SCALES, direct_quadrature_currents
+from maglev_model.compiled import compiled
+from maglev_model.parameters import ParameterError
 from maglev_plant.arrays import STATE, FloatArray, StageArrays, stage_arrays
-from maglev_plant.commutation import SCALES, direct_quadrature_currents
-from maglev_plant.compiled import compiled
 from maglev_plant.dynamics import advance
 from maglev_plant.encoder import encode
 from maglev_plant.parameters import AmplifierParameters, PlantParameters

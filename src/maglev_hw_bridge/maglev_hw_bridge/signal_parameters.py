@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 
-from maglev_node.parameters import ParameterError, parameter
+from maglev_model.parameters import ParameterError, parameter
 
 PHASES = 12
 ENCODERS = 6

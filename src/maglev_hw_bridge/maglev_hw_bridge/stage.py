@@ -22,7 +22,7 @@ from maglev_hw_bridge.faults import Fault, command_fault, encoder_fault, range_f
 from maglev_hw_bridge.guard import Guard
 from maglev_hw_bridge.landing import Landing, impact_of_cut
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_node.stage import EncoderSample, StageError, motor_currents
+from maglev_model.stage import EncoderSample, StageError, motor_currents
 
 FloatArray = NDArray[np.float64]
 

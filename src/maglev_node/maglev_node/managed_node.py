@@ -9,9 +9,9 @@ from typing import TypeVar
 
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 
+from maglev_model.parameters import ParameterError, parameter
+from maglev_model.stage import StageError
 from maglev_node.node import MaglevNode, NodeError, SourceParameters
-from maglev_node.parameters import ParameterError, parameter
-from maglev_node.stage import StageError
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

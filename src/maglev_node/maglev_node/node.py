@@ -23,10 +23,10 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
-from maglev_node import parameters as table
+from maglev_model import parameters as table
+from maglev_model.parameters import ParameterError, parameter
 from maglev_node import ros_parameters
 from maglev_node.dds import prepare_middleware
-from maglev_node.parameters import ParameterError, parameter
 from maglev_node.topics import DIAGNOSTICS
 
 DISCOVERY_TIME = 1.0

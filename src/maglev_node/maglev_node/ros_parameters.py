@@ -8,8 +8,8 @@ from typing import TypeVar
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 
-from maglev_node import parameters as table
-from maglev_node.parameters import Spec, unknown_parameter
+from maglev_model import parameters as table
+from maglev_model.parameters import Spec, unknown_parameter
 
 T = TypeVar('T')
 

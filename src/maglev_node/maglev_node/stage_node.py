@@ -11,12 +11,12 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import Trigger
 
+from maglev_model.parameters import ParameterError, parameter
+from maglev_model.stage import EncoderSample, Stage, StageError
 from maglev_msgs.msg import Currents, Measurement
 from maglev_node.managed_node import ManagedNode, ManagedParameters
 from maglev_node.node import NodeError
-from maglev_node.parameters import ParameterError, parameter
 from maglev_node.polling import PolledSubscription, Queues
-from maglev_node.stage import EncoderSample, Stage, StageError
 from maglev_node.stamp import stamp_now
 from maglev_node.topics import CURRENTS, MEASUREMENT, sample_qos
 

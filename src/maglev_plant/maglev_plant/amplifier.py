@@ -8,6 +8,13 @@ transformed back: a quadrature current beyond the peak costs direct current, as 
 
 from __future__ import annotations
 
+from maglev_model.commutation import (
+    direct_quadrature_currents,
+    electrical_angle,
+    phase_currents,
+)
+from maglev_model.compiled import compiled
+from maglev_model.machine import Machine
 from maglev_plant.arrays import (
     CONTINUOUS,
     DQ_SCALE,
@@ -20,13 +27,6 @@ from maglev_plant.arrays import (
     THERMAL_RECOVERY,
     FloatArray,
 )
-from maglev_plant.commutation import (
-    direct_quadrature_currents,
-    electrical_angle,
-    phase_currents,
-)
-from maglev_plant.compiled import compiled
-from maglev_plant.machine import Machine
 
 
 @compiled

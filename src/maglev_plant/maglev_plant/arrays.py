@@ -1,6 +1,6 @@
 """The simulated stage as flat arrays, which compiled functions take quickly from Python.
 
-``scalars`` begins with the :class:`~maglev_plant.machine.Machine` of the true plant; ``axes`` holds
+``scalars`` begins with the :class:`~maglev_model.machine.Machine` of the true plant; ``axes`` holds
 what exists once per axis; ``memory`` is everything that changes with time.
 """
 
@@ -13,8 +13,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from maglev_plant.commutation import SCALES
-from maglev_plant.machine import Machine, machine_constants
+from maglev_model.commutation import SCALES
+from maglev_model.machine import Machine, machine_constants
 from maglev_plant.parameters import PlantParameters
 
 FloatArray = NDArray[np.float64]

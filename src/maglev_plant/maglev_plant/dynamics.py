@@ -6,6 +6,9 @@ import math
 
 import numpy as np
 
+from maglev_model.compiled import compiled
+from maglev_model.machine import Machine, machine_from_array
+from maglev_model.platen import output_accelerations
 from maglev_plant.amplifier import set_targets
 from maglev_plant.arrays import (
     AMPLITUDE,
@@ -28,9 +31,6 @@ from maglev_plant.arrays import (
     VISCOUS,
     FloatArray,
 )
-from maglev_plant.compiled import compiled
-from maglev_plant.machine import Machine, machine_from_array
-from maglev_plant.platen import output_accelerations
 from maglev_plant.stops import apply_stops
 
 

@@ -9,6 +9,8 @@ import math
 
 import numpy as np
 
+from maglev_model.compiled import compiled
+from maglev_model.machine import machine_from_array
 from maglev_plant.arrays import (
     GAP_NOISE,
     GAP_RESOLUTION,
@@ -19,8 +21,6 @@ from maglev_plant.arrays import (
     STATE,
     FloatArray,
 )
-from maglev_plant.compiled import compiled
-from maglev_plant.machine import machine_from_array
 
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 _MIX_1 = np.uint64(0xBF58476D1CE4E5B9)

@@ -6,8 +6,9 @@ import dataclasses
 import math
 from typing import Any
 
-from maglev_node.parameters import ParameterError, group, parameter
-from maglev_plant.machine import AXES, MachineParameters
+from maglev_model.axes import AXES
+from maglev_model.machine import MachineParameters
+from maglev_model.parameters import ParameterError, group, parameter
 
 _BY_AXIS = ', by axis y, x, z, phi, theta'
 

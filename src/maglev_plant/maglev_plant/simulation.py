@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maglev_node.stage import EncoderSample, motor_currents
+from maglev_model.compiled import compiled
+from maglev_model.stage import EncoderSample, motor_currents
 from maglev_plant.arrays import (
     FLOWING,
     LOAD,
@@ -19,7 +20,6 @@ from maglev_plant.arrays import (
     initial_memory,
     stage_arrays,
 )
-from maglev_plant.compiled import compiled
 from maglev_plant.dynamics import advance
 from maglev_plant.encoder import encode
 from maglev_plant.parameters import PlantParameters

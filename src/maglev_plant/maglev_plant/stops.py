@@ -19,8 +19,8 @@ from __future__ import annotations
 
 import math
 
+from maglev_model.compiled import compiled
 from maglev_plant.arrays import GYRATION, LOCKED, LOWER, SEAT_RADIUS, STATE, UPPER, FloatArray
-from maglev_plant.compiled import compiled
 
 
 @compiled

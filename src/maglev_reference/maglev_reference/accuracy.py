@@ -19,8 +19,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from maglev_model.axes import AXES, FloatArray
 from maglev_reference.currents import friction
-from maglev_reference.geometry import AXES, FloatArray
 from maglev_reference.model_parameters import InternalModelParameters
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.trajectories import Course, course

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from maglev_node.parameters import ParameterError
-from maglev_reference.geometry import AXES, UNITS, FloatArray, motor_gaps
+from maglev_model.axes import AXES, UNITS, FloatArray
+from maglev_model.parameters import ParameterError
+from maglev_reference.geometry import motor_gaps
 from maglev_reference.parameters import Limits
 from maglev_reference.profiles import Kinematics
 

@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from maglev_model.axes import AXES, PHI, FloatArray, X, Y, Z
 from maglev_reference.check import UnreachableError
-from maglev_reference.geometry import AXES, PHI, FloatArray, X, Y, Z, motor_gaps
+from maglev_reference.geometry import motor_gaps
 from maglev_reference.model_parameters import MachineParameters
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.profiles import Kinematics

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import Chebyshev
 
-from maglev_node.parameters import ParameterError
-from maglev_reference.geometry import AXES, FloatArray, X, Y, Z
+from maglev_model.axes import AXES, FloatArray, X, Y, Z
+from maglev_model.parameters import ParameterError
 from maglev_reference.profiles import Kinematics
 from maglev_reference.trajectory_parameters import (
     ChirpParameters,

@@ -5,13 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
-
-AXES = ('y', 'x', 'z', 'phi', 'theta')
-UNITS = ('m', 'm', 'm', 'rad', 'rad')
-Y, X, Z, PHI, THETA = range(5)
+from maglev_model.axes import PHI, THETA, FloatArray, Y
 
 
 def motor_gaps(position: FloatArray, radius: float) -> FloatArray:

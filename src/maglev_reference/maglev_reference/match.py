@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from maglev_node.parameters import ParameterError, from_yaml
+from maglev_model.axes import AXES
+from maglev_model.parameters import ParameterError, from_yaml
 from maglev_reference.accuracy import compliance, disturbance_lines
-from maglev_reference.geometry import AXES
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.trajectories import course
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from maglev_node.parameters import ParameterError, parameter
+from maglev_model.parameters import ParameterError, parameter
 from maglev_reference.trajectory_parameters import OMEGA_0, same_length
 
 

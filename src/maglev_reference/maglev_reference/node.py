@@ -10,10 +10,11 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import Trigger
 
+from maglev_model.parameters import parameter
+from maglev_model.phases import Phase
 from maglev_msgs.msg import Currents, Measurement, Reference
 from maglev_node.node import MaglevNode, SourceParameters
 from maglev_node.node import main as run_main
-from maglev_node.parameters import parameter
 from maglev_node.polling import Queues
 from maglev_node.stamp import stamp_now
 from maglev_node.topics import CURRENTS, MEASUREMENT, REFERENCE, sample_qos
@@ -21,7 +22,6 @@ from maglev_reference.accuracy import summary, warnings
 from maglev_reference.check import UnreachableError
 from maglev_reference.geometry import outputs
 from maglev_reference.parameters import ReferenceParameters
-from maglev_reference.segments import Phase
 from maglev_reference.timeline import Timeline
 
 _BURST = 128  # messages at one poll; half of what a reader's queue holds

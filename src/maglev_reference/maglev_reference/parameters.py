@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 
-from maglev_node.parameters import ParameterError, group, parameter
-from maglev_reference.geometry import AXES
+from maglev_model.axes import AXES
+from maglev_model.parameters import ParameterError, group, parameter
 from maglev_reference.model_parameters import InternalModelParameters, MachineParameters
 from maglev_reference.trajectory_parameters import (
     ChirpParameters,

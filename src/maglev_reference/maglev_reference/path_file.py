@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from maglev_node.parameters import ParameterError
-from maglev_reference.geometry import AXES, UNITS, FloatArray
+from maglev_model.axes import AXES, UNITS, FloatArray
+from maglev_model.parameters import ParameterError
 from maglev_reference.profiles import Kinematics
 from maglev_reference.trajectory_parameters import FileParameters
 

@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from maglev_reference.geometry import FloatArray
+from maglev_model.axes import FloatArray
 
 PEAK_VELOCITY = 15.0 / 8.0  # of a minimum-jerk move, times distance / time
 PEAK_ACCELERATION = 10.0 / math.sqrt(3.0)  # times distance / time^2

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import enum
 import itertools
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 
+from maglev_model.axes import PHI, FloatArray, Y
+from maglev_model.phases import Phase
 from maglev_reference.check import utilisation, within
 from maglev_reference.currents import current_use
-from maglev_reference.geometry import PHI, FloatArray, Y
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.profiles import (
     Motion,
@@ -28,18 +28,6 @@ _TRIALS = 24
 _GRID = 201  # points at which a tried move is checked
 _BRAKING_MARGIN = 0.1  # share of the range that a braking platen keeps away from its limits
 _SAMPLE_MAX = 2**62
-
-
-class Phase(enum.IntEnum):
-    """What a segment is for; the values of maglev_msgs/Reference."""
-
-    REST = 0
-    LIFT_OFF = 1
-    HOLD = 2
-    TRACK = 3
-    STEP = 4
-    LAND = 5
-    END = 6
 
 
 class Segment(NamedTuple):

@@ -14,12 +14,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from maglev_model.axes import FloatArray, Y
+from maglev_model.phases import Phase
 from maglev_reference.check import check_rest, check_samples
 from maglev_reference.currents import check_currents
-from maglev_reference.geometry import FloatArray, Y
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.profiles import Kinematics, State
-from maglev_reference.segments import Phase, Planner, Segment
+from maglev_reference.segments import Planner, Segment
 
 _CHUNK = 256  # samples evaluated together, so that a value does not depend on who asks for how many
 _CHECKED_TOGETHER = 65536

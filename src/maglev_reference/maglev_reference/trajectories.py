@@ -7,9 +7,9 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from maglev_model.axes import AXES, UNITS, FloatArray
 from maglev_reference.check import UnreachableError
 from maglev_reference.curves import Chirp, Helix, Sinusoids, Square
-from maglev_reference.geometry import AXES, UNITS, FloatArray
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.profiles import (
     Kinematics,

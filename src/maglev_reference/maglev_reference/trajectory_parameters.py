@@ -6,8 +6,8 @@ import dataclasses
 import math
 from collections.abc import Sequence
 
-from maglev_node.parameters import ParameterError, group, parameter
-from maglev_reference.geometry import AXES
+from maglev_model.axes import AXES
+from maglev_model.parameters import ParameterError, group, parameter
 
 OMEGA_0 = 1.5 * math.pi  # the paper's w_0 [rad/s]
 

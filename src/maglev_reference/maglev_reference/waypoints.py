@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from maglev_reference.geometry import FloatArray
+from maglev_model.axes import FloatArray
 from maglev_reference.profiles import Kinematics, minimum_jerk_time
 from maglev_reference.trajectory_parameters import WaypointParameters
 

@@ -21,12 +21,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Protocol
 
-from maglev_controller.design import AxisDesign
+from maglev_controller.design.gains import AxisDesign
 from maglev_controller.laws.checks import check_machine
 from maglev_controller.laws.feedback_lead_lag import FeedbackLeadLag
 from maglev_controller.laws.feedback_soi import FeedbackSecondOrderIntegral
-from maglev_controller.laws.internal_model import InternalModelRegulator
 from maglev_controller.laws.jacobian_lead_lag import JacobianLeadLag
+from maglev_controller.laws.output_regulator import InternalModelRegulator
 from maglev_controller.laws.regulator_3dof import Regulator3DOF
 from maglev_controller.parameters import ControllerParameters
 
@@ -45,7 +45,7 @@ class ControlLaw(Protocol):
 
 
 CONTROL_LAWS: Mapping[str, ControlLaw] = {
-    'internal_model': InternalModelRegulator(),
+    'output_regulator': InternalModelRegulator(),
     'jacobian_lead_lag': JacobianLeadLag(),
     'feedback_lead_lag': FeedbackLeadLag(),
     'feedback_soi': FeedbackSecondOrderIntegral(),

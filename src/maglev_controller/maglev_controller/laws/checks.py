@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from maglev_controller.parameters import ControllerParameters
-from maglev_node.parameters import ParameterError
+from maglev_model.parameters import ParameterError
 
 
 def check_machine(parameters: ControllerParameters) -> None:

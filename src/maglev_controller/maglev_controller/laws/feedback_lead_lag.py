@@ -6,9 +6,9 @@ integrator against constant forces close the loop.
 
 from __future__ import annotations
 
-from maglev_controller.design import AxisDesign
+from maglev_controller.design.gains import AxisDesign
+from maglev_controller.design.loop_shaping import lead_lag, shaped_axis
 from maglev_controller.laws.checks import check_compensator, check_inverse
-from maglev_controller.laws.compensator import lead_lag, shaped_axis
 from maglev_controller.parameters import ControllerParameters
 
 

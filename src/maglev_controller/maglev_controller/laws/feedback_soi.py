@@ -8,9 +8,9 @@ encoders' noise from the currents.
 
 from __future__ import annotations
 
-from maglev_controller.design import AxisDesign
+from maglev_controller.design.gains import AxisDesign
+from maglev_controller.design.loop_shaping import second_order_integral, shaped_axis
 from maglev_controller.laws.checks import check_compensator, check_inverse
-from maglev_controller.laws.compensator import second_order_integral, shaped_axis
 from maglev_controller.parameters import ControllerParameters
 
 

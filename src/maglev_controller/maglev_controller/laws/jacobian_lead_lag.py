@@ -8,13 +8,14 @@ decouple the axes there, and each lead-lag compensator is designed for its own l
 
 from __future__ import annotations
 
-from maglev_controller.design import AxisDesign
-from maglev_controller.equilibrium import stiffness
+from maglev_controller.design.gains import AxisDesign
+from maglev_controller.design.loop_shaping import lead_lag, shaped_axis
 from maglev_controller.laws.checks import check_compensator, check_inverse
-from maglev_controller.laws.compensator import lead_lag, shaped_axis
 from maglev_controller.parameters import ControllerParameters
-from maglev_node.parameters import ParameterError
-from maglev_plant.machine import AXES, machine_constants
+from maglev_model.axes import AXES
+from maglev_model.equilibrium import stiffness
+from maglev_model.machine import machine_constants
+from maglev_model.parameters import ParameterError
 
 
 class JacobianLeadLag:

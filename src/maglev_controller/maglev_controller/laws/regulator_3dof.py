@@ -7,10 +7,10 @@ match it.
 
 from __future__ import annotations
 
-from maglev_controller.design import AxisDesign, design_axis
+from maglev_controller.design.gains import AxisDesign, design_axis
 from maglev_controller.laws.checks import check_inverse
 from maglev_controller.parameters import ControllerParameters
-from maglev_node.parameters import ParameterError
+from maglev_model.parameters import ParameterError
 
 
 class Regulator3DOF:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_node.parameters import ParameterError
+from maglev_model.parameters import ParameterError
 
 CountArray = NDArray[np.int32]
 VoltArray = NDArray[np.float64]

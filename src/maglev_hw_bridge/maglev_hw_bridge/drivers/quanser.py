@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from maglev_hw_bridge.drivers import CountArray, DriverError, VoltArray, WatchdogError
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_node.parameters import ParameterError
+from maglev_model.parameters import ParameterError
 
 _DIGITAL_LINES = 32
 _CLOCK_DRIFT = 5e-4

@@ -1,0 +1,1 @@
+"""Gains and margins of an axis, computed once at configuration."""

@@ -1,0 +1,304 @@
+"""The sampled closed loop of one axis as it runs: poles, margins, sensitivity, friction at rest.
+
+The controller is one linear system from e to w, internal model (or compensator), rate estimate and
+delay included; the plant is what the inverse leaves of the axis, (13), with w held over a sample.
+All is computed once, at configuration.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maglev_controller.design.gains import AxisDesign
+from maglev_controller.design.internal_model import FloatArray, discretise
+from maglev_controller.design.observer import NO_OBSERVER
+from maglev_controller.parameters import ControllerParameters, MarginParameters
+from maglev_model.parameters import ParameterError
+
+ComplexArray = NDArray[np.complex128]
+
+_GRID = 1500  # frequencies looked at
+_SLOPES = 24  # slopes of friction looked at
+
+
+class Sampled(NamedTuple):
+    """x⁺ = A x + B u, y = C x + D u, one input, one output; shapes (n, n), (n,), (n,)."""
+
+    state: FloatArray
+    input: FloatArray
+    output: FloatArray
+    direct: float
+
+
+@dataclasses.dataclass(frozen=True)
+class LoopMargins:
+    """What :func:`loop_margins` found.
+
+    ``poles`` (m,) of the sampled closed loop, z; ``crossover`` [rad/s], the highest; ``phase``
+    margin [deg], the smallest at any crossover; gain margins as factors, ``gain_up`` (inf for
+    none) and ``gain_down`` (0 for none); ``sensitivity``, the peak of |1 / (1 + L)|;
+    ``friction_slope`` [1/s] up to which friction at rest leaves the loop stable, at most the
+    ``wanted_slope``, the steepest that was looked at.
+    """
+
+    poles: ComplexArray
+    period: float
+    crossover: float
+    phase: float
+    gain_up: float
+    gain_down: float
+    sensitivity: float
+    friction_slope: float
+    wanted_slope: float
+
+    @property
+    def spectral_radius(self) -> float:
+        """Largest |z| of the poles."""
+        return float(np.max(np.abs(self.poles)))
+
+    @property
+    def natural_poles(self) -> ComplexArray:
+        """The poles as ln z / T [rad/s], the slowest first, of a pair the upper; fast ones too."""
+        found = np.log(self.poles.astype(np.complex128) + 0.0) / self.period
+        upper = found[found.imag >= -1e-9]
+        return np.asarray(upper[np.argsort(-upper.real)])
+
+    def text(self, axis: str) -> str:
+        """One line for the log."""
+        friction = ''
+        if self.friction_slope > 0.0:
+            friction = f', at rest stable with friction up to {self.friction_slope:.0f} 1/s'
+        poles = ' '.join(_pole_text(pole) for pole in self.natural_poles)
+        return (
+            f'{axis}: crossover {self.crossover:.0f} rad/s, phase margin {self.phase:.1f} deg, '
+            f'gain margin {_decibel(self.gain_up)} up, {_decibel(self.gain_down)} down, '
+            f'sensitivity peak {self.sensitivity:.2f}{friction}; poles [rad/s] {poles}'
+        )
+
+
+def _pole_text(pole: complex) -> str:
+    return f'{pole.real:.3g}' + (f'±{pole.imag:.3g}i' if pole.imag > 1e-6 else '')
+
+
+def _decibel(factor: float) -> str:
+    return f'{abs(20.0 * math.log10(factor)):.1f} dB' if 0.0 < factor < math.inf else 'any'
+
+
+def controller_system(design: AxisDesign, period: float, delay: int) -> Sampled:
+    """e to w as ``law.control_step`` computes it; ``delay`` is what the observer predicts over.
+
+    State (ξ, f) with the derivative filter; (ξ, predicted position and rate) with the observer, and
+    the w still to act with a delay.
+    """
+    n, gain = design.drive.size, design.total_gain
+    if design.observer == NO_OBSERVER:
+        rate, forget = design.derivative
+        state = np.zeros((n + 1, n + 1))
+        state[:n, :n], state[n, n] = design.transition, 1.0 - forget
+        return Sampled(
+            state,
+            np.append(design.drive, forget),
+            np.append(gain[2:], -gain[1] * rate),
+            float(gain[0] + gain[1] * rate),
+        )
+    step, push = np.array([[1.0, period], [0.0, 1.0]]), np.array([0.5 * period**2, period])
+    correction = np.array(design.observer)
+    size = n + 2 + (delay > 0)
+    seen, read = np.zeros((2, size)), correction
+    seen[:, n : n + 2] = np.eye(2) - np.outer(correction, [1.0, 0.0])
+    after, after_read = step @ seen, step @ read  # but for what acts
+    used, used_read = seen, read
+    if delay:
+        after[:, n + 2] = push
+        used, used_read = after, after_read
+    output, direct = gain[:2] @ used, float(gain[:2] @ used_read)
+    output[:n] += gain[2:]
+    state, drive = np.zeros((size, size)), np.zeros(size)
+    state[:n, :n], drive[:n] = design.transition, design.drive
+    state[n : n + 2], drive[n : n + 2] = after, after_read
+    if delay:
+        state[n + 2], drive[n + 2] = output, direct
+    else:
+        state[n : n + 2] += np.outer(push, output)
+        drive[n : n + 2] += push * direct
+    return Sampled(state, drive, output, direct)
+
+
+def plant_system(
+    period: float, delay: int = 0, *, stiffness: float = 0.0, friction: float = 0.0
+) -> Sampled:
+    """w to e: ë = α e − κ ė + w, held; ``stiffness`` α [1/s²], ``friction`` κ [1/s]."""
+    moved, pushed = discretise(
+        np.array([[0.0, 1.0], [stiffness, -friction]]), np.array([[0.0], [1.0]]), period
+    )
+    size = 2 + delay
+    state, drive = np.zeros((size, size)), np.zeros(size)
+    state[:2, :2] = moved
+    if delay == 0:
+        drive[:] = pushed[:, 0]
+    else:
+        state[:2, 2], drive[-1] = pushed[:, 0], 1.0
+        state[2:-1, 3:] = np.eye(delay - 1)
+    return Sampled(state, drive, np.eye(1, size)[0], 0.0)
+
+
+def closed_loop(controller: Sampled, plant: Sampled) -> FloatArray:
+    """The closed loop's transition matrix; state: the plant's, then the controller's."""
+    n = plant.input.size
+    loop = np.zeros((n + controller.input.size,) * 2)
+    loop[:n, :n] = plant.state + controller.direct * np.outer(plant.input, plant.output)
+    loop[:n, n:] = np.outer(plant.input, controller.output)
+    loop[n:, :n] = np.outer(controller.input, plant.output)
+    loop[n:, n:] = controller.state
+    return loop
+
+
+def response(system: Sampled, z: ComplexArray) -> ComplexArray:
+    """Frequency response at ``z`` (m,)."""
+    unit = np.eye(system.input.size)
+    columns = np.linalg.solve(
+        z[:, None, None] * unit - system.state, system.input.astype(np.complex128)[:, None]
+    )
+    return np.asarray(columns[:, :, 0] @ system.output + system.direct)
+
+
+def loop_margins(
+    design: AxisDesign, period: float, *, delay: int = 0, designed: int = 0, slope: float = 0.0
+) -> LoopMargins:
+    """Poles and margins of one axis at sample time ``period`` [s].
+
+    ``delay`` [samples] is what the currents come late, ``designed`` what the controller was
+    designed for; ``slope`` [1/s], when above 0, is the friction up to which standing is looked at.
+    """
+    controller = controller_system(design, period, designed)
+    plant = plant_system(period, delay, stiffness=design.stiffness)
+    omega = np.geomspace(0.05, math.pi / period * (1.0 - 1e-9), _GRID)
+    z = np.exp(1j * omega * period)
+    loop = -response(controller, z) * response(plant, z)
+    crossover, phase = _crossover(omega, loop)
+    up, down = _gain_margins(loop)
+    return LoopMargins(
+        poles=np.asarray(np.linalg.eigvals(closed_loop(controller, plant)), dtype=np.complex128),
+        period=period,
+        crossover=crossover,
+        phase=phase,
+        gain_up=up,
+        gain_down=down,
+        sensitivity=float(np.max(1.0 / np.abs(1.0 + loop))),
+        friction_slope=_friction(controller, design, (period, delay), slope),
+        wanted_slope=slope,
+    )
+
+
+def _crossover(omega: FloatArray, loop: ComplexArray) -> tuple[float, float]:
+    """Highest frequency where |L| is 1, and the smallest phase margin [deg] where it is."""
+    size = np.log(np.abs(loop))
+    k = np.nonzero(np.sign(size[:-1]) != np.sign(size[1:]))[0]
+    if k.size == 0:
+        return 0.0, 180.0
+    share = size[k] / (size[k] - size[k + 1])
+    at = loop[k] * (loop[k + 1] / loop[k]) ** share
+    crossovers = omega[k] * (omega[k + 1] / omega[k]) ** share
+    return float(crossovers[-1]), float(np.min(np.abs(np.degrees(np.angle(-at)))))
+
+
+def _gain_margins(loop: ComplexArray) -> tuple[float, float]:
+    """Smallest factor above 1, and largest below, that puts ``loop`` on −1."""
+    before, after = loop[:-1], loop[1:]
+    crossing = (np.sign(before.imag) != np.sign(after.imag)) & (before.real < 0.0)
+    share = before.imag[crossing] / (before.imag - after.imag)[crossing]
+    real = before.real[crossing] + share * (after.real - before.real)[crossing]
+    factors = -1.0 / real[real < 0.0]
+    up, down = factors[factors > 1.0], factors[factors < 1.0]
+    return float(np.min(up, initial=math.inf)), float(np.max(down, initial=0.0))
+
+
+def _friction(
+    controller: Sampled, design: AxisDesign, timing: tuple[float, int], slope: float
+) -> float:
+    """The slope up to which every slope leaves the loop stable; ``timing``: sample time, delay."""
+    reached = 0.0
+    if slope <= 0.0:
+        return reached
+    period, delay = timing
+    for friction in np.geomspace(slope / 100.0, slope, _SLOPES):
+        plant = plant_system(period, delay, stiffness=design.stiffness, friction=friction)
+        if np.max(np.abs(np.linalg.eigvals(closed_loop(controller, plant)))) >= 1.0:
+            break
+        reached = float(friction)
+    return reached
+
+
+def all_margins(
+    parameters: ControllerParameters, designs: Sequence[AxisDesign]
+) -> tuple[LoopMargins, ...]:
+    """The margins of all axes; of axes designed alike only once."""
+    known: dict[tuple[bytes, float], LoopMargins] = {}
+    keys = [(design.total_gain.tobytes(), design.stiffness) for design in designs]
+    for key, design in zip(keys, designs, strict=True):
+        if key not in known:
+            known[key] = _margins_of(parameters, design)
+    return tuple(known[key] for key in keys)
+
+
+def _margins_of(parameters: ControllerParameters, design: AxisDesign) -> LoopMargins:
+    """The margins of one axis with the delay and the friction its parameters tell."""
+    own = parameters.internal_model
+    return loop_margins(
+        design,
+        parameters.sample_time,
+        delay=parameters.input_delay,
+        designed=parameters.input_delay,
+        slope=0.0 if design.model.form == 'compensator' else own.friction_slope,
+    )
+
+
+def check_margins(parameters: ControllerParameters, found: LoopMargins, axis: str) -> None:
+    """Refuse a loop that is unstable, or short of the least margins unless they are overridden.
+
+    Raises :class:`ParameterError`, naming the axis, the figure and what would help.
+    """
+    if not found.spectral_radius < 1.0:
+        worst = found.poles[np.argmax(np.abs(found.poles))]
+        raise ParameterError(
+            f'{axis}: with these gains and this rate estimate the loop is unstable at a sample '
+            f'time of {found.period:g} s (largest pole |z| = {found.spectral_radius:.4f} at '
+            f'{abs(np.angle(worst)) / found.period:.4g} rad/s)'
+        )
+    if parameters.margins.override:
+        return
+    short = _shortfall(parameters.margins, found)
+    if short:
+        raise ParameterError(
+            f'{axis}: {short}; make the axis slower (its poles or LQR weights), '
+            "or take it as it is with 'margins.override'"
+        )
+    slope = found.wanted_slope
+    if found.friction_slope < 0.999 * slope:
+        raise ParameterError(
+            f'{axis}: standing still hunts with friction steeper than {found.friction_slope:.0f} '
+            f"1/s, 'internal_model.friction_slope' asks for {slope:g}; make the axis faster or its "
+            'internal model slower (weight_model), or ask for less'
+        )
+
+
+def _shortfall(least: MarginParameters, found: LoopMargins) -> str:
+    if found.phase < least.phase:
+        return (
+            f"the phase margin is {found.phase:.1f} deg, 'margins.phase' asks for {least.phase:g}"
+        )
+    gain = min(found.gain_up, 1.0 / found.gain_down if found.gain_down > 0.0 else math.inf)
+    if gain < least.gain:
+        return f"the gain margin is a factor {gain:.2f}, 'margins.gain' asks for {least.gain:g}"
+    if found.sensitivity > least.sensitivity:
+        return (
+            f"the sensitivity peaks at {found.sensitivity:.2f}, 'margins.sensitivity' allows "
+            f'{least.sensitivity:g}'
+        )
+    return ''

@@ -1,0 +1,1 @@
+"""The machine, written once: its physics, geometry and parameters. No ROS here."""

@@ -1,0 +1,275 @@
+"""From wanted accelerations w to motor currents: the two inverses of the plant (9).
+
+``simplified_inverse`` is the paper's (8), (12), which leaves the quadratic terms of (9) out.
+``exact_inverse`` gives every motor the attraction it must have and solves (2) for its i_d, the i_q
+given. Both keep the currents within their limits and report what accelerations these give.
+
+Arguments of both, all arrays float64: ``output`` y, x, z, phi, theta (5,) [m, rad]; ``wanted`` w
+(5,) [m/s², rad/s²]; ``controlled`` (5,), an axis whose value is 0 gets no control, as the paper's
+v_φ = v_θ = 0. Written: ``direct`` i_d and ``quadrature`` i_q (4,) [A], ``realised`` (5,), the
+accelerations the limited currents give by the inverse's own model, and ``excess`` (2,), sat(u) − u
+of u_x, u_z [A]. Both return whether anything was limited.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maglev_model.compiled import compiled
+from maglev_model.machine import Machine
+from maglev_model.motor import attraction_coefficients
+from maglev_model.platen import affine_terms, gaps_from_outputs
+
+FloatArray = NDArray[np.float64]
+
+
+RESERVE = 1.1
+"""Attraction a motor gets at least, in b² i_q²: at 1 its i_d has no slope left to act with."""
+
+
+class Limits(NamedTuple):
+    """What the currents must keep to."""
+
+    current: float  # phase-current amplitude of a motor, sat_7 of (17) [A]
+    levitation_first: float  # 1: i_q yields to the i_d that carries the platen; 0: each by itself
+    least_attraction: (
+        float  # share of the weight that stays carried, so that the tilts keep authority
+    )
+
+
+@compiled
+def _clip(value: float, limit: float) -> float:
+    return min(max(value, -limit), limit)
+
+
+@compiled
+def simplified_inverse(
+    machine: Machine,
+    limits: Limits,
+    controlled: FloatArray,
+    output: FloatArray,
+    wanted: FloatArray,
+    direct: FloatArray,
+    quadrature: FloatArray,
+    realised: FloatArray,
+    excess: FloatArray,
+) -> bool:
+    """The paper's (12) and (8), each current limited by itself; arguments: see the module."""
+    gap = np.empty(4)
+    gaps_from_outputs(machine, output, gap)
+    a, b, c = np.empty(9), np.empty(6), np.empty(6)
+    h_x, h_z = _horizontal_gains(machine, gap)
+    u_x = controlled[1] * wanted[1] / h_x
+    u_z = controlled[2] * wanted[2] / h_z
+    sat_x, sat_z = _clip(u_x, limits.current), _clip(u_z, limits.current)
+    affine_terms(machine, output[0], output[3], output[4], sat_x, sat_z, a, b, c)
+    v_y, v_phi, v_theta = _solve_simplified(a, b, c, wanted, controlled)
+    unlimited = (
+        0.5 * (v_y + v_phi),
+        0.5 * (v_y - v_theta),
+        0.5 * (v_y - v_phi),
+        0.5 * (v_y + v_theta),
+    )
+    saturated = sat_x != u_x or sat_z != u_z
+    for motor in range(4):
+        direct[motor] = _clip(unlimited[motor], limits.current)
+        quadrature[motor] = sat_z if motor % 2 == 0 else sat_x
+        saturated = saturated or direct[motor] != unlimited[motor]
+    v_y = 0.5 * (direct[0] + direct[1] + direct[2] + direct[3])
+    v_phi, v_theta = direct[0] - direct[2], direct[3] - direct[1]
+    realised[0] = a[0] + a[2] * v_y + a[1] * v_phi + a[6] * v_theta
+    realised[1], realised[2] = h_x * sat_x, h_z * sat_z
+    realised[3] = b[0] + b[2] * v_y + b[1] * v_phi
+    realised[4] = c[0] + c[2] * v_y + c[1] * v_theta
+    excess[0], excess[1] = sat_x - u_x, sat_z - u_z
+    return bool(saturated)
+
+
+@compiled
+def _horizontal_gains(machine: Machine, gap: FloatArray) -> tuple[float, float]:
+    """h_x, h_z of (11) [m/s² per A]."""
+    _, _, h_1 = attraction_coefficients(machine, gap[0])
+    _, _, h_2 = attraction_coefficients(machine, gap[1])
+    _, _, h_3 = attraction_coefficients(machine, gap[2])
+    _, _, h_4 = attraction_coefficients(machine, gap[3])
+    return -(h_2 + h_4) / machine.M_x, -(h_1 + h_3) / machine.M_z
+
+
+@compiled
+def _solve_simplified(
+    a: FloatArray, b: FloatArray, c: FloatArray, wanted: FloatArray, controlled: FloatArray
+) -> tuple[float, float, float]:
+    """v_y, v_φ, v_θ of (12), without the rows and columns of axes that get no control."""
+    phi, theta = controlled[3] / b[1], controlled[4] / c[1]
+    rest_phi, rest_theta = phi * (wanted[3] - b[0]), theta * (wanted[4] - c[0])
+    slope = a[2] - a[1] * phi * b[2] - a[6] * theta * c[2]
+    v_y = controlled[0] * (wanted[0] - a[0] - a[1] * rest_phi - a[6] * rest_theta) / slope
+    return v_y, rest_phi - phi * b[2] * v_y, rest_theta - theta * c[2] * v_y
+
+
+@compiled
+def exact_inverse(
+    machine: Machine,
+    limits: Limits,
+    controlled: FloatArray,
+    output: FloatArray,
+    wanted: FloatArray,
+    direct: FloatArray,
+    quadrature: FloatArray,
+    realised: FloatArray,
+    excess: FloatArray,
+) -> bool:
+    """Per motor through the quadratic (2). See the module for the arguments.
+
+    With P the attraction of a motor, (6) and (7) ask for ΣP = M_y (G − w_y), P_1 − P_3 and P_4 −
+    P_2; the fourth condition is (8)'s, P_1 + P_3 = P_2 + P_4. By (2), P = (a − b i_d)² + b² i_q²,
+    so i_d = (a − √(P − b² i_q²)) / b. Attraction cannot be negative: w_y is limited so that
+    ``least_attraction`` stays, and a tilt gets at most all of its pair. Since P ≥ b² i_q², a pair
+    that needs much i_q gets more than half of the attraction, and what that cannot serve limits
+    u_x and u_z.
+    """
+    gap, a, b, h = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
+    gaps_from_outputs(machine, output, gap)
+    for motor in range(4):
+        a[motor], b[motor], h[motor] = attraction_coefficients(machine, gap[motor])
+    h_x, h_z = -(h[1] + h[3]) / machine.M_x, -(h[0] + h[2]) / machine.M_z
+    u_x = controlled[1] * wanted[1] / h_x
+    u_z = controlled[2] * wanted[2] / h_z
+    attraction = np.empty(4)
+    saturated = _allocate(machine, limits, controlled, output, wanted, a, b, u_x, u_z, attraction)
+    sat_x = _clip(u_x, _quadrature_limit(limits, a, b, attraction, 1))
+    sat_z = _clip(u_z, _quadrature_limit(limits, a, b, attraction, 0))
+    saturated = saturated or sat_x != u_x or sat_z != u_z
+    for motor in range(4):
+        quadrature[motor] = sat_z if motor % 2 == 0 else sat_x
+    for first in range(2):
+        together = controlled[3 + first] == 0.0
+        if _direct_currents(limits, a, b, first, together, attraction, quadrature, direct):
+            saturated = True
+    for motor in range(4):
+        root = a[motor] - b[motor] * direct[motor]
+        attraction[motor] = root * root + (b[motor] * quadrature[motor]) ** 2
+    lever = machine.r / machine.I_x
+    total = attraction[0] + attraction[1] + attraction[2] + attraction[3]
+    realised[0] = machine.G - total / machine.M_y
+    realised[1], realised[2] = h_x * sat_x, h_z * sat_z
+    realised[3] = lever * (attraction[0] - attraction[2]) - machine.k_s_phi * output[3]
+    realised[4] = lever * (attraction[3] - attraction[1]) - machine.k_s_theta * output[4]
+    excess[0], excess[1] = sat_x - u_x, sat_z - u_z
+    return bool(saturated)
+
+
+@compiled
+def _allocate(
+    machine: Machine,
+    limits: Limits,
+    controlled: FloatArray,
+    output: FloatArray,
+    wanted: FloatArray,
+    a: FloatArray,
+    b: FloatArray,
+    u_x: float,
+    u_z: float,
+    attraction: FloatArray,
+) -> bool:
+    """The attraction each motor shall have, (4,) [N]; returns whether not all is possible."""
+    weight = machine.M_y * machine.G
+    total = machine.M_y * (machine.G - wanted[0])
+    if controlled[0] == 0.0:
+        total = a[0] * a[0] + a[1] * a[1] + a[2] * a[2] + a[3] * a[3]
+    least = limits.least_attraction * weight
+    saturated = total < least
+    total = max(total, least)
+    inertia = machine.I_x / machine.r
+    phi = controlled[3] * inertia * (wanted[3] + machine.k_s_phi * output[3])
+    theta = controlled[4] * inertia * (wanted[4] + machine.k_s_theta * output[4])
+    saturated = saturated or abs(phi) > 0.5 * total or abs(theta) > 0.5 * total
+    phi, theta = _clip(phi, 0.5 * total), _clip(theta, 0.5 * total)
+    along_z = 0.5 * total
+    if limits.levitation_first != 0.0:
+        bound = limits.current
+        need_z = _pair_need(_clip(u_z, bound), b[0], b[2], phi, 0.25 * least)
+        need_x = _pair_need(_clip(u_x, bound), b[1], b[3], -theta, 0.25 * least)
+        if need_x + need_z > total:
+            along_z = total * need_z / (need_x + need_z)
+        else:
+            along_z = min(max(along_z, need_z), total - need_x)
+    along_x = total - along_z
+    phi, theta = _clip(phi, along_z), _clip(theta, along_x)
+    attraction[0], attraction[2] = 0.5 * (along_z + phi), 0.5 * (along_z - phi)
+    attraction[1], attraction[3] = 0.5 * (along_x - theta), 0.5 * (along_x + theta)
+    return bool(saturated)
+
+
+@compiled
+def _pair_need(i_q: float, b_one: float, b_two: float, difference: float, least: float) -> float:
+    """Attraction [N] a pair needs for its i_q, when the first motor has ``difference`` more."""
+    one = 2.0 * max(RESERVE * (b_one * i_q) ** 2, least) - difference
+    two = 2.0 * max(RESERVE * (b_two * i_q) ** 2, least) + difference
+    return max(one, two)
+
+
+@compiled
+def _quadrature_limit(
+    limits: Limits, a: FloatArray, b: FloatArray, attraction: FloatArray, first: int
+) -> float:
+    """Largest |i_q| [A] of a pair of motors, ``first`` and ``first + 2``.
+
+    When levitation comes first, it is the i_q at which the motor still makes its attraction P
+    within the amplitude L: i_d² + i_q² = (a² − 2 a s + P) / b² ≤ L² with s = √(P − b² i_q²).
+    """
+    largest = limits.current
+    if limits.levitation_first == 0.0:
+        return largest
+    for motor in (first, first + 2):
+        span = (limits.current * b[motor]) ** 2
+        least_root = (a[motor] * a[motor] + attraction[motor] - span) / (2.0 * a[motor])
+        room = attraction[motor] - max(least_root, 0.0) ** 2
+        largest = min(largest, math.sqrt(max(room, 0.0)) / b[motor])
+    return largest
+
+
+@compiled
+def _direct_currents(
+    limits: Limits,
+    a: FloatArray,
+    b: FloatArray,
+    first: int,
+    together: bool,
+    attraction: FloatArray,
+    quadrature: FloatArray,
+    direct: FloatArray,
+) -> bool:
+    """i_d of motors ``first`` and ``first + 2``, one for both where their tilt gets no control."""
+    one, two = first, first + 2
+    spent_one = (b[one] * quadrature[one]) ** 2
+    spent_two = (b[two] * quadrature[two]) ** 2
+    saturated = False
+    if together:
+        square = b[one] * b[one] + b[two] * b[two]
+        middle = a[one] * b[one] + a[two] * b[two]
+        rest = a[one] ** 2 + a[two] ** 2 + spent_one + spent_two - attraction[one] - attraction[two]
+        discriminant = middle * middle - square * rest
+        saturated = discriminant < 0.0
+        direct[one] = (middle - math.sqrt(max(discriminant, 0.0))) / square
+        direct[two] = direct[one]
+    else:
+        square_one, square_two = attraction[one] - spent_one, attraction[two] - spent_two
+        # The limit on i_q is computed with the same numbers; what is left below zero is rounding.
+        saturated = (
+            min(square_one + 1e-9 * attraction[one], square_two + 1e-9 * attraction[two]) < 0.0
+        )
+        direct[one] = (a[one] - math.sqrt(max(square_one, 0.0))) / b[one]
+        direct[two] = (a[two] - math.sqrt(max(square_two, 0.0))) / b[two]
+    for motor in (one, two):
+        limit = limits.current
+        if limits.levitation_first != 0.0:
+            limit = math.sqrt(max(limit * limit - quadrature[motor] ** 2, 0.0))
+        limited = _clip(direct[motor], limit * (1.0 + 1e-12))
+        saturated = saturated or abs(limited - direct[motor]) > 1e-9
+        direct[motor] = limited
+    return bool(saturated)

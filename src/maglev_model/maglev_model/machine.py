@@ -1,0 +1,262 @@
+"""The machine: Table I as parameters, and the constants the equations of motion are written with.
+
+Where the paper leaves a value open (σ_m, µ_rec, k_w1, G, the torsional springs) or prints it
+wrongly (K_v2), the default is the one that makes the force model consistent: with
+``K_v2 = 3·√2·L_A·p_m·W·k_w1/p`` the fields of magnets and winding superpose and
+``K_v2² = 4·K_v1·K_v3``.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maglev_model.compiled import compiled
+from maglev_model.parameters import ParameterError, parameter
+
+VACUUM_PERMEABILITY = 4e-7 * math.pi
+"""µ0 [H/m]."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class MachineParameters:
+    """Table I, the torsional springs of (7), gravity, and the range the stops leave."""
+
+    slot_width: float = parameter(
+        12.7e-3, unit='m', lower=1e-3, upper=0.1, description='stator slot width b_0'
+    )
+    slot_pitch: float = parameter(
+        19.05e-3, unit='m', lower=1e-3, upper=0.1, description='stator slot pitch t_1'
+    )
+    turns: int = parameter(900, lower=1, upper=100_000, description='turns per phase W')
+    winding_factor: float = parameter(
+        1.0, lower=0.1, upper=1.0, description='winding factor of the first harmonic k_w1'
+    )
+    pole_pairs: int = parameter(3, lower=1, upper=100, description='stator pole pairs p per motor')
+    pole_pitch: float = parameter(
+        57.15e-3, unit='m', lower=5e-3, upper=0.5, description='pole pitch tau'
+    )
+    magnet_height: float = parameter(
+        5e-3, unit='m', lower=1e-4, upper=0.1, description='magnet height h_m'
+    )
+    magnet_length: float = parameter(
+        50e-3, unit='m', lower=1e-3, upper=1.0, description='magnet length L_A'
+    )
+    magnet_width: float = parameter(
+        28.58e-3, unit='m', lower=1e-3, upper=0.5, description='magnet width tau_p'
+    )
+    magnets: int = parameter(4, lower=1, upper=100, description='number of magnets p_m per motor')
+    magnet_charge: float = parameter(
+        875_400.0,
+        unit='A/m',
+        lower=1e5,
+        upper=2e6,
+        description='magnetic surface charge sigma_m, here the coercivity H_c',
+    )
+    recoil_permeability: float = parameter(
+        1.05, lower=1.0, upper=2.0, description='relative recoil permeability mu_rec of the magnets'
+    )
+    motors: int = parameter(
+        4,
+        lower=1,
+        upper=4,
+        description='4, or 1: motor 2 alone, the machine of refs. [10], [11], moving in y and x',
+    )
+    mass_x: float = parameter(
+        10.6, unit='kg', lower=0.1, upper=1000.0, description='moving mass M_x along X'
+    )
+    mass_z: float = parameter(
+        8.6, unit='kg', lower=0.1, upper=1000.0, description='moving mass M_z along Z'
+    )
+    mass_y: float = parameter(
+        6.9, unit='kg', lower=0.1, upper=1000.0, description='moving mass M_y along Y'
+    )
+    radius: float = parameter(
+        0.397, unit='m', lower=0.01, upper=5.0, description='platen centre to mover centres r'
+    )
+    inertia: float = parameter(
+        0.5268,
+        unit='kg m^2',
+        lower=1e-3,
+        upper=1000.0,
+        description='moment of inertia about the X and the Z axis, I_x = I_z',
+    )
+    gravity: float = parameter(
+        9.81, unit='m/s^2', lower=0.0, upper=30.0, description='acceleration of gravity G'
+    )
+    spring_phi: float = parameter(
+        4000.0, unit='1/s^2', lower=0.0, upper=1e6, description='torsional spring k_s_phi'
+    )
+    spring_theta: float = parameter(
+        900.0, unit='1/s^2', lower=0.0, upper=1e6, description='torsional spring k_s_theta'
+    )
+    gap_min: float = parameter(
+        0.018, unit='m', lower=1e-3, upper=0.2, description='air gap y at the upper stop'
+    )
+    gap_max: float = parameter(
+        0.031, unit='m', lower=1e-3, upper=0.2, description='air gap y at the lower stop (at rest)'
+    )
+    x_max: float = parameter(
+        0.05, unit='m', lower=1e-4, upper=1.0, description='stops along X at plus and minus this'
+    )
+    z_max: float = parameter(
+        0.05, unit='m', lower=1e-4, upper=1.0, description='stops along Z at plus and minus this'
+    )
+    phi_max: float = parameter(
+        0.003, unit='rad', lower=1e-5, upper=0.1, description='stops of phi at plus and minus this'
+    )
+    theta_max: float = parameter(
+        0.014,
+        unit='rad',
+        lower=1e-5,
+        upper=0.1,
+        description='stops of theta at plus and minus this',
+    )
+
+    def __post_init__(self) -> None:
+        """Refuse what each value alone cannot show to be wrong."""
+        if self.motors not in (1, 4):
+            raise ParameterError(f"parameter 'motors' is {self.motors}, it must be 1 or 4")
+        for small, large in (
+            ('gap_min', 'gap_max'),
+            ('slot_width', 'slot_pitch'),
+            ('magnet_width', 'pole_pitch'),
+        ):
+            low, high = getattr(self, small), getattr(self, large)
+            if low >= high:
+                raise ParameterError(
+                    f"parameter '{small}' is {low:g} m, it must be less than '{large}' ({high:g} m)"
+                )
+
+    @property
+    def lower_limit(self) -> tuple[float, float, float, float, float]:
+        """Least reachable y, x, z, phi, theta [m, m, m, rad, rad]."""
+        return (self.gap_min, -self.x_max, -self.z_max, -self.phi_max, -self.theta_max)
+
+    @property
+    def upper_limit(self) -> tuple[float, float, float, float, float]:
+        """Greatest reachable y, x, z, phi, theta [m, m, m, rad, rad]."""
+        return (self.gap_max, self.x_max, self.z_max, self.phi_max, self.theta_max)
+
+
+class Machine(NamedTuple):
+    """Constants of (1)-(7), floats in SI units; one argument of compiled functions."""
+
+    K_v1: float  # (3)
+    K_v2: float
+    K_v3: float
+    K_h: float  # (4)
+    C_v1: float  # K_v1 / M_y, (6)
+    C_v2: float
+    C_v3: float
+    C_x: float  # K_h / M_x
+    C_z: float  # K_h / M_z
+    b_0: float
+    t_1: float
+    tau: float
+    h_m: float
+    mu_rec: float
+    B_0: float  # B_pmy1(g) sinh(pi (h_m + g) / tau) [T]
+    r: float
+    M_x: float
+    M_y: float
+    M_z: float
+    I_x: float  # = I_z
+    k_rot: float  # r M_y / I_x, (7)
+    k_s_phi: float
+    k_s_theta: float
+    G: float
+    motors: float  # 4, or 1 for motor 2 alone
+
+
+def machine_constants(parameters: MachineParameters) -> Machine:
+    """The constants of (3), (4), (6), (7) for one set of parameters."""
+    p = parameters
+    L_A, p_m, W, k_w1 = p.magnet_length, p.magnets, p.turns, p.winding_factor
+    tau, mu_0 = p.pole_pitch, VACUUM_PERMEABILITY
+    magnet_shape = math.sinh(math.pi * p.magnet_height / tau) * math.sin(
+        math.pi * p.magnet_width / (2.0 * tau)
+    )
+    K_v1 = L_A * p_m * tau / (4.0 * mu_0)
+    K_v2 = 3.0 * math.sqrt(2.0) * L_A * p_m * W * k_w1 / p.pole_pairs
+    K_v3 = 18.0 * L_A * p_m * W**2 * k_w1**2 * mu_0 / (tau * p.pole_pairs**2)
+    K_h = (
+        12.0
+        * math.sqrt(2.0)
+        * W
+        * k_w1
+        * p_m
+        * L_A
+        * p.magnet_charge
+        * mu_0
+        * magnet_shape
+        / (math.pi * p.pole_pairs)
+    )
+    return Machine(
+        K_v1=K_v1,
+        K_v2=K_v2,
+        K_v3=K_v3,
+        K_h=K_h,
+        C_v1=K_v1 / p.mass_y,
+        C_v2=K_v2 / p.mass_y,
+        C_v3=K_v3 / p.mass_y,
+        C_x=K_h / p.mass_x,
+        C_z=K_h / p.mass_z,
+        b_0=p.slot_width,
+        t_1=p.slot_pitch,
+        tau=tau,
+        h_m=p.magnet_height,
+        mu_rec=p.recoil_permeability,
+        B_0=4.0 / math.pi * mu_0 * p.magnet_charge * magnet_shape,
+        r=p.radius,
+        M_x=p.mass_x,
+        M_y=p.mass_y,
+        M_z=p.mass_z,
+        I_x=p.inertia,
+        k_rot=p.radius * p.mass_y / p.inertia,
+        k_s_phi=p.spring_phi,
+        k_s_theta=p.spring_theta,
+        G=p.gravity,
+        motors=float(p.motors),
+    )
+
+
+def machine_to_array(machine: Machine) -> NDArray[np.float64]:
+    """The constants in one array, shape (25,), for :func:`machine_from_array`."""
+    return np.array(machine, dtype=np.float64)
+
+
+@compiled
+def machine_from_array(m: NDArray[np.float64]) -> Machine:
+    """The :class:`Machine` in an array; an array is the cheaper argument for calls from Python."""
+    return Machine(
+        m[0],
+        m[1],
+        m[2],
+        m[3],
+        m[4],
+        m[5],
+        m[6],
+        m[7],
+        m[8],
+        m[9],
+        m[10],
+        m[11],
+        m[12],
+        m[13],
+        m[14],
+        m[15],
+        m[16],
+        m[17],
+        m[18],
+        m[19],
+        m[20],
+        m[21],
+        m[22],
+        m[23],
+        m[24],
+    )

@@ -1,0 +1,1 @@
+"""Bags: recording, reading, analysing."""

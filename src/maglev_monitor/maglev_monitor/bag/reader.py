@@ -1,0 +1,157 @@
+"""Read a bag into what the metrics take, whole or cut off. No ROS here."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from rosbags.rosbag2 import Reader
+from rosbags.rosbag2.errors import ReaderError
+from rosbags.typesys import Stores, get_typestore
+
+from maglev_monitor.bag.mcap_file import McapError, McapFile, Message
+from maglev_monitor.bag.writer import BagError
+from maglev_monitor.metrics.samples import KEY_OF_MESSAGE_TYPE, Records, decode
+
+_DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
+_READER_BATCH = 5000  # messages handed on at once when rosbags reads
+
+
+class Diagnostic(NamedTuple):
+    """One status of /diagnostics: its stamp [ns], level (REP-107), node, message and values."""
+
+    stamp: int
+    level: int
+    name: str
+    message: str
+    values: dict[str, str]
+
+
+@dataclasses.dataclass
+class Batch:
+    """Consecutive messages of a bag: decoded samples by topic key, and diagnostics."""
+
+    samples: dict[str, Records]
+    diagnostics: list[Diagnostic]
+
+
+class Bag:
+    """A bag that is read from front to back.
+
+    :param path: folder of a run, folder of a bag, or one file of a bag.
+    :raises BagError: when there is no bag at ``path``.
+
+    After :meth:`batches` is exhausted, ``notes`` says in plain lines what was wrong with the bag,
+    and ``counts`` holds the messages read by topic.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.files = _find(path)
+        self.notes: list[str] = []
+        self.counts: dict[str, int] = {}
+        self._typestore = get_typestore(Stores.ROS2_JAZZY)
+
+    def batches(self) -> Iterator[Batch]:
+        """The bag's content in the order it was written. Raises :class:`BagError`."""
+        counts: defaultdict[str, int] = defaultdict(int)
+        self.notes.clear()
+        try:
+            for messages in self._read():
+                for message in messages:
+                    counts[message.topic] += 1
+                yield self._batch(messages)
+        except (OSError, McapError, ReaderError) as error:
+            raise BagError(f"cannot read the bag '{self.path}': {error}") from error
+        except ValueError as error:
+            raise BagError(f"cannot read the bag '{self.path}': {error}") from error
+        self.counts = dict(counts)
+        if not any(counts.values()):
+            raise BagError(f"the bag '{self.path}' holds no message")
+
+    def _read(self) -> Iterator[list[Message]]:
+        if self._needs_rosbags():
+            yield from self._read_by_rosbags()
+            return
+        for number, path in enumerate(self.files):
+            file = McapFile(path)
+            found = 0
+            for messages in file.chunks():
+                found += len(messages)
+                yield messages
+            if not file.complete:
+                self.notes.append(
+                    f"'{path.name}' is not whole, {file.damage}: {found} messages recovered"
+                )
+            elif number == 0 and self.path.is_dir() and not (self.path / 'metadata.yaml').is_file():
+                self.notes.append(f"'{self.path}' has no metadata.yaml: read without it")
+
+    def _needs_rosbags(self) -> bool:
+        """Whether only rosbags reads this kind of bag: sqlite3, or compressed as a whole."""
+        if any(path.suffix != '.mcap' for path in self.files):
+            return True
+        metadata = self.path / 'metadata.yaml'
+        if not metadata.is_file():
+            return False
+        text = metadata.read_text(encoding='utf-8', errors='replace').lower()
+        return any(f'compression_mode: {mode}' in text for mode in ('message', 'file'))
+
+    def _read_by_rosbags(self) -> Iterator[list[Message]]:
+        with Reader(self.path) as reader:
+            batch = []
+            for connection, time, data in reader.messages():
+                batch.append(Message(connection.topic, connection.msgtype, time, bytes(data)))
+                if len(batch) == _READER_BATCH:
+                    yield batch
+                    batch = []
+            yield batch
+
+    def _batch(self, messages: list[Message]) -> Batch:
+        samples: defaultdict[str, list[bytes]] = defaultdict(list)
+        diagnostics: list[Diagnostic] = []
+        for message in messages:
+            key = KEY_OF_MESSAGE_TYPE.get(message.message_type)
+            if key is not None:
+                samples[key].append(message.data)
+            elif message.message_type == _DIAGNOSTICS:
+                diagnostics += self._diagnostics(message.data)
+        return Batch({key: decode(key, data) for key, data in samples.items()}, diagnostics)
+
+    def _diagnostics(self, data: bytes) -> list[Diagnostic]:
+        array: Any = self._typestore.deserialize_cdr(data, _DIAGNOSTICS)
+        stamp = array.header.stamp.sec * 1_000_000_000 + array.header.stamp.nanosec
+        return [
+            Diagnostic(
+                stamp,
+                int(status.level),
+                status.name,
+                status.message,
+                {pair.key: pair.value for pair in status.values},
+            )
+            for status in array.status
+        ]
+
+
+def _find(path: Path) -> tuple[Path, list[Path]]:
+    """The bag that is meant by a path, and its files in order."""
+    if not path.exists():
+        raise BagError(f"there is no bag '{path}'")
+    if path.is_file():
+        if path.name == 'metadata.yaml':
+            return _find(path.parent)
+        if path.suffix not in ('.mcap', '.db3'):
+            raise BagError(f"'{path}' is no bag: expected a folder, a .mcap or a .db3 file")
+        return path, [path]
+    for folder in (path, path / 'bag'):
+        files = [*folder.glob('*.mcap'), *folder.glob('*.db3'), *folder.glob('*.zstd')]
+        if files:
+            return folder, sorted(files, key=_natural)
+    raise BagError(f"there is no bag in '{path}': no .mcap and no .db3 file")
+
+
+def _natural(path: Path) -> tuple[int, str]:
+    """Order of a bag's files: name_2 comes before name_10."""
+    number = path.name.split('.')[0].rsplit('_', 1)[-1]
+    return (int(number) if number.isdigit() else -1, path.name)

@@ -1,0 +1,151 @@
+"""Join the topics of a run by sample number, whatever the order of arrival, in bounded memory.
+
+Rows come out in blocks aligned to multiples of the block size, so what is computed block by block
+is the same, bit for bit, for a live run and for its bag. No ROS here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from maglev_model.phases import Phase
+from maglev_monitor.metrics.samples import TOPIC_TYPES, Records, stamps
+
+_COLUMNS: dict[str, tuple[tuple[str, str], ...]] = {
+    'reference': (
+        ('phase', 'phase'),
+        ('segment', 'segment'),
+        ('reference', 'position'),
+        ('target', 'target'),
+    ),
+    'measurement': (('gap', 'gap'), ('x', 'x'), ('z', 'z'), ('late_samples', 'late_samples')),
+    'currents': (
+        ('direct_current', 'direct_current'),
+        ('quadrature_current', 'quadrature_current'),
+    ),
+    'controller': (('saturated', 'saturated'), ('mode', 'mode')),
+    'plant': (('state', 'state'), ('thermal_load', 'thermal_load')),
+}
+
+
+def _row_type() -> np.dtype[np.void]:
+    columns: list[tuple[str, str] | tuple[str, str, tuple[int]]] = [
+        ('sequence', '<i8'),
+        ('stamp', '<i8'),
+    ]
+    for key, names in _COLUMNS.items():
+        columns.append((f'has_{key}', '?'))
+        fields = {field.name: field for field in TOPIC_TYPES[key].fields}
+        for column, source in names:
+            field = fields[source]
+            if field.length > 1:
+                columns.append((column, field.kind, (field.length,)))
+            else:
+                columns.append((column, field.kind))
+    return np.dtype(columns)
+
+
+ROW = _row_type()
+"""One joined sample: ``sequence``, ``stamp`` of the measurement [ns], ``has_<topic>`` and the
+columns of each topic (all zero where the topic has no message for this sample)."""
+
+
+_ON_ITS_WAY = 100  # a topic that is further behind than this has stopped [samples]
+
+
+class Joiner:
+    """Joins records of the five topics into rows by sample number.
+
+    A block is handed out when every topic has gone past its end, or when the stage is ``window``
+    samples past it (a topic that never comes, or a lost message, must not hold the rest back).
+    Later arrivals for a block handed out already are dropped and counted.
+
+    :param block: rows in a block.
+    :param window: samples to wait for a topic that lags behind.
+    """
+
+    def __init__(self, block: int = 500, window: int = 4000) -> None:
+        if block < 1 or window < 0:
+            raise ValueError(f'block is {block} and window {window}: need block >= 1, window >= 0')
+        self._size = block
+        self._window = window
+        self._pending: dict[int, Records] = {}
+        self._next = -1  # number of the first block not handed out yet, -1 before the first one
+        self._newest = dict.fromkeys(TOPIC_TYPES, -1)
+        self.end: int | None = None
+        """First sample of END in the reference, None while there is none."""
+        self.dropped = 0
+        self.duplicates = 0
+
+    @property
+    def newest(self) -> dict[str, int]:
+        """Highest sample number seen on each topic, -1 when there was none."""
+        return dict(self._newest)
+
+    def add(self, key: str, records: Records) -> None:
+        """Take records of one topic, from :func:`~.samples.decode`, in any order."""
+        if not len(records):
+            return
+        sequence = records['sequence'].astype(np.int64)
+        numbers = sequence // self._size
+        for number in np.unique(numbers):
+            inside = np.flatnonzero(numbers == number)
+            if number < self._next:
+                self.dropped += len(inside)
+                continue
+            self._fill(
+                self._block(int(number)), key, sequence[inside] % self._size, records[inside]
+            )
+        if key == 'reference' and self.end is None:
+            ends = sequence[records['phase'] == Phase.END]
+            self.end = int(ends.min()) if len(ends) else None
+        self._newest[key] = max(self._newest[key], int(sequence.max()))
+
+    def take(self) -> Iterator[Records]:
+        """Hand out complete blocks, in order: arrays of :data:`ROW`, shape (block,)."""
+        slowest = min(self._newest.values())
+        overdue = max(self._newest['measurement'], self._newest['currents']) - self._window
+        while self._pending:
+            number = min(self._pending)
+            end = (number + 1) * self._size
+            if end - 1 > slowest and end - 1 > overdue:
+                return
+            yield self._hand_out(number)
+
+    def finish(self) -> Iterator[Records]:
+        """Hand out what is left, up to where the topics that still flow have all come.
+
+        What is only on its way when a run is broken off, and a reference ahead of it, is not lost.
+        """
+        newest = [n for key, n in self._newest.items() if key != 'reference' and n >= 0]
+        last = min((n for n in newest if n > max(newest) - _ON_ITS_WAY), default=-1)
+        if self.end is not None and self.end <= max(newest, default=-1):
+            last = max(last, self.end)
+        while self._pending:
+            block = self._hand_out(min(self._pending))
+            block = block[: max(last - int(block['sequence'][0]) + 1, 0)]
+            if len(block):
+                yield block
+
+    def _hand_out(self, number: int) -> Records:
+        self._next = number + 1
+        return self._pending.pop(number)
+
+    def _block(self, number: int) -> Records:
+        block = self._pending.get(number)
+        if block is None:
+            block = np.zeros(self._size, ROW)
+            block['sequence'] = number * self._size + np.arange(self._size)
+            self._pending[number] = block
+        return block
+
+    def _fill(self, block: Records, key: str, rows: np.ndarray, records: Records) -> None:
+        present = block[f'has_{key}']
+        self.duplicates += int(np.count_nonzero(present[rows]))
+        present[rows] = True
+        if key == 'measurement':
+            block['stamp'][rows] = stamps(records)
+        for column, source in _COLUMNS[key]:
+            block[column][rows] = records[source]

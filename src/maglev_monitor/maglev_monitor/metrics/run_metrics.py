@@ -1,0 +1,343 @@
+"""The figures of a run, computed while it lasts or from its bag: same blocks, same code, same bits.
+
+A run lasts from the first sample whose reference leaves REST to the first one of END; what is
+outside does not count. Memory does not grow with its length (but for one small record for each
+step). No ROS here.
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maglev_model.axes import AXES
+from maglev_model.phases import Phase
+from maglev_monitor.metrics.samples import TOPIC_TYPES, Records, outputs_from_gaps
+from maglev_monitor.metrics.settings import MetricsParameters, RunParameters
+from maglev_monitor.metrics.step_response import StepTracker
+from maglev_monitor.metrics.verdict import verdict
+
+FloatArray = NDArray[np.float64]
+
+SOURCES = ('true', 'measured')
+_OUTPUT_STATES = [0, 2, 4, 6, 8]  # x1, x3, x5, x7, x9 of Table II
+_OPTIONAL = ('controller', 'plant')  # a stage or controller may do without
+_TICK_RESOLUTION = 1e-6  # of the tick histogram [s]
+_TICK_BINS = 200_000
+_PHASE_SHIFTS = np.array([0.0, 2.0, 4.0]) * np.pi / 3.0
+_RUNNING = (Phase.LIFT_OFF, Phase.HOLD, Phase.TRACK, Phase.STEP, Phase.LAND)
+
+
+def positions(rows: Records, radius: float) -> FloatArray:
+    """Outputs by source (true, measured) [m, rad], NaN where unknown, shape (n, 2, 5)."""
+    found = np.full((len(rows), 2, 5), np.nan)
+    plant = rows['has_plant']
+    found[plant, 0] = rows['state'][plant][:, _OUTPUT_STATES]
+    measured = rows['has_measurement']
+    some = rows[measured]
+    found[measured, 1] = outputs_from_gaps(some['gap'], some['x'], some['z'], radius)
+    return found
+
+
+def phase_currents(rows: Records, pole_pitch: float) -> FloatArray:
+    """Currents in the three phases of the four motors by the inverse Park transform,
+    amplitude-invariant.
+
+    The electrical angle is pi s / tau, s the displacement along the motor: z for motors 1 and 3, x
+    for 2 and 4.
+
+    :param rows: joined rows that have currents and measurement, shape (n,).
+    :param pole_pitch: tau [m].
+    :returns: shape (n, 4, 3) [A].
+    """
+    displacement = np.stack([rows['z'], rows['x'], rows['z'], rows['x']], axis=1)
+    angle = (np.pi / pole_pitch * displacement)[:, :, None] - _PHASE_SHIFTS
+    direct = rows['direct_current'][:, :, None]
+    quadrature = rows['quadrature_current'][:, :, None]
+    currents: FloatArray = direct * np.cos(angle) - quadrature * np.sin(angle)
+    return currents
+
+
+class RunMetrics:
+    """Takes the blocks of :class:`maglev_monitor.metrics.joiner.Joiner` and yields the figures."""
+
+    def __init__(self, settings: MetricsParameters) -> None:
+        self._settings = settings
+        self.started = False
+        self.ended = False
+        self.phase: int = Phase.REST
+        self._expected = -1
+        self._run_rows = 0
+        self._seen = dict.fromkeys(TOPIC_TYPES, 0)
+        self._missing = dict.fromkeys(TOPIC_TYPES, 0)
+        self._last_reference = -1  # number of the last sample with one
+        self._tracking = _Tracking()
+        self._measured_samples = 0
+        self._steps: list[StepTracker] = []
+        self._segment: int | None = None
+        self._target: FloatArray | None = None
+        self._step: StepTracker | None = None
+        self._currents = _Currents(settings.pole_pitch)
+        self._timing = _Timing()
+        self._faults: dict[str, tuple[int, str]] = {}
+        self._end_stamp: int | None = None
+
+    @property
+    def tick_histogram(self) -> NDArray[np.int64]:
+        """Numbers of ticks in bins of 1 µs from 0 on; the last bin holds what is longer."""
+        return self._timing.histogram
+
+    def add(self, block: Records) -> Records:
+        """Take one block and return the rows of it that belong to the run.
+
+        Blocks come in order of their sample numbers; one that is left out counts as missing.
+        """
+        if self.ended:
+            return block[:0]
+        phases = self._phases(block)
+        first, last = 0, len(block)
+        if not self.started:
+            moving = np.flatnonzero(np.isin(phases, _RUNNING))
+            if not len(moving):
+                return block[:0]
+            self.started = True
+            first = int(moving[0])
+        else:
+            self._skip(int(block['sequence'][0]) - self._expected)
+        ends = np.flatnonzero(phases[first:] == Phase.END)
+        if len(ends):
+            self.ended = True
+            last = first + int(ends[0])
+        rows = block[first:last]
+        if len(rows):
+            self._add_rows(rows, phases[first:last])
+        if self.ended:
+            at_end = block[last]
+            self._end_stamp = int(at_end['stamp']) or self._timing.last_stamp
+        self._expected = int(block['sequence'][-1]) + 1
+        return rows
+
+    def add_fault(self, stamp: int, node: str, message: str) -> None:
+        """Take an error a node reported at a time [ns since the epoch]; its first counts."""
+        known = self._faults.get(node)
+        if known is None or stamp < known[0]:
+            self._faults[node] = (stamp, message)
+
+    def result(self, run: RunParameters) -> dict[str, Any]:
+        """The content of ``metrics.json``; complete only when the run has reached its end."""
+        source = 0 if self._seen['plant'] else 1
+        found: dict[str, Any] = {
+            'scenario': run.scenario,
+            'stage': run.stage,
+            'mode': run.mode,
+            'duration': self._measured_samples * self._settings.sample_time,
+            'samples': self._measured_samples,
+            'run_samples': self._run_rows,
+            **self._missing_result(),
+            'error_source': SOURCES[source],
+            'axes': self._tracking.result(source),
+            'steps': [entry for step in self._steps for entry in step.results(source)],
+            'currents': self._currents.result(),
+            'timing': self._timing.result(self._settings.sample_time),
+            'faults': self._fault_result(),
+        }
+        return {**found, **verdict(found, run.limits, complete=self.ended)}
+
+    def _missing_result(self) -> dict[str, Any]:
+        """By topic; a landing after a reference that was ended is no loss of the reference."""
+        by_topic = {
+            key: count
+            for key, count in self._missing.items()
+            if self._seen[key] or key not in _OPTIONAL
+        }
+        if self._seen['reference'] and not self.ended:
+            by_topic['reference'] -= self._expected - 1 - self._last_reference
+        return {'missing_samples': sum(by_topic.values()), 'missing_by_topic': by_topic}
+
+    def _fault_result(self) -> list[str]:
+        limit = self._end_stamp if self._end_stamp is not None else np.iinfo(np.int64).max
+        return [
+            f'{node}: {message}'
+            for node, (stamp, message) in sorted(self._faults.items())
+            if stamp <= limit
+        ]
+
+    def _phases(self, block: Records) -> NDArray[np.uint8]:
+        """Phases of the rows; a row without reference has that of the row before it."""
+        known = np.where(block['has_reference'], np.arange(len(block)), -1)
+        known = np.maximum.accumulate(known)
+        phases: NDArray[np.uint8] = np.where(known >= 0, block['phase'][known], self.phase)
+        self.phase = int(phases[-1])
+        return phases
+
+    def _skip(self, rows: int) -> None:
+        self._run_rows += rows
+        for key in self._missing:
+            self._missing[key] += rows
+
+    def _add_rows(self, rows: Records, phases: NDArray[np.uint8]) -> None:
+        self._run_rows += len(rows)
+        for key in TOPIC_TYPES:
+            present = int(np.count_nonzero(rows[f'has_{key}']))
+            self._seen[key] += present
+            self._missing[key] += len(rows) - present
+        position = positions(rows, self._settings.radius)
+        referenced = rows['has_reference']
+        if np.any(referenced):
+            self._last_reference = int(rows['sequence'][referenced][-1])
+        measured = referenced & np.isin(phases, (Phase.TRACK, Phase.STEP))
+        self._measured_samples += int(np.count_nonzero(measured))
+        tracked = referenced & (phases == Phase.TRACK)
+        self._tracking.add(position[tracked] - rows['reference'][tracked][:, None, :])
+        self._add_segments(rows[referenced], position[referenced])
+        self._currents.add(rows)
+        self._timing.add(rows)
+
+    def _add_segments(self, rows: Records, position: FloatArray) -> None:
+        """Follow the set-points and feed the steps between them."""
+        changes = np.flatnonzero(np.diff(rows['segment'])) + 1
+        bounds = [0, *changes.tolist(), len(rows)]
+        for first, last in itertools.pairwise(bounds):
+            if first == last:
+                continue
+            part = rows[first:last]
+            if int(part['segment'][0]) != self._segment:
+                self._enter_segment(part[0])
+            if self._step is not None:
+                self._step.add(part['sequence'], position[first:last])
+
+    def _enter_segment(self, row: np.void) -> None:
+        target = np.array(row['target'])
+        start = self._target if self._target is not None else np.array(row['reference'])
+        self._segment = int(row['segment'])
+        self._target = target
+        self._step = None
+        if row['phase'] == Phase.STEP and (target != start).any():
+            self._step = StepTracker(self._settings, start, target, int(row['sequence']))
+            self._steps.append(self._step)
+
+
+class _Tracking:
+    """Mean, rms and largest |e| by source and axis."""
+
+    def __init__(self) -> None:
+        self._count = np.zeros(2, np.int64)
+        self._sum = np.zeros((2, 5))
+        self._squares = np.zeros((2, 5))
+        self._max = np.zeros((2, 5))
+
+    def add(self, error: FloatArray) -> None:
+        """Take errors, shape (n, 2, 5), NaN where unknown [m, rad]."""
+        for source in range(2):
+            known = error[~np.isnan(error[:, source, 0]), source]
+            if not len(known):
+                continue
+            magnitude = np.abs(known)
+            self._count[source] += len(known)
+            self._sum[source] += magnitude.sum(axis=0)
+            self._squares[source] += np.square(known).sum(axis=0)
+            self._max[source] = np.maximum(self._max[source], magnitude.max(axis=0))
+
+    def result(self, source: int) -> dict[str, dict[str, float | None]]:
+        count = int(self._count[source])
+        table: dict[str, dict[str, float | None]] = {}
+        for index, axis in enumerate(AXES):
+            table[axis] = {
+                'mean_abs_error': float(self._sum[source, index] / count) if count else None,
+                'rms_error': float(np.sqrt(self._squares[source, index] / count))
+                if count
+                else None,
+                'max_abs_error': float(self._max[source, index]) if count else None,
+            }
+        return table
+
+
+class _Currents:
+    """Peak phase current, rms of the current vector, saturation and thermal load."""
+
+    def __init__(self, pole_pitch: float) -> None:
+        self._pole_pitch = pole_pitch
+        self._count = 0
+        self._squares = np.zeros(4)
+        self._peak = 0.0
+        self._saturated = 0
+        self._thermal_load = 0.0
+
+    def add(self, rows: Records) -> None:
+        driven = rows[rows['has_currents'] & rows['has_measurement']]
+        self._saturated += int(np.count_nonzero(rows['saturated']))
+        self._thermal_load = float(max(self._thermal_load, rows['thermal_load'].max()))
+        if not len(driven):
+            return
+        self._count += len(driven)
+        squares = np.square(driven['direct_current']) + np.square(driven['quadrature_current'])
+        self._squares += squares.sum(axis=0)
+        self._peak = max(self._peak, float(np.abs(phase_currents(driven, self._pole_pitch)).max()))
+
+    def result(self) -> dict[str, Any]:
+        """``rms`` is of the vector (i_d, i_q), hence sqrt(2) times that of a phase [A]."""
+        return {
+            'peak_phase': self._peak,
+            'rms': np.sqrt(self._squares / max(self._count, 1)).tolist(),
+            'saturated_samples': self._saturated,
+            'peak_thermal_load': self._thermal_load,
+        }
+
+
+class _Timing:
+    """Wall-clock time from sample to sample, from the measurements' stamps."""
+
+    def __init__(self) -> None:
+        self.histogram = np.zeros(_TICK_BINS, np.int64)
+        self._longest = 0
+        self._first: tuple[int, int, int] | None = None  # sequence, stamp, late samples
+        self._last: tuple[int, int, int] | None = None
+
+    def add(self, rows: Records) -> None:
+        rows = rows[rows['has_measurement']]
+        if not len(rows):
+            return
+        sequence, stamp = rows['sequence'], rows['stamp']
+        if self._last is not None:
+            sequence = np.concatenate([[self._last[0]], sequence])
+            stamp = np.concatenate([[self._last[1]], stamp])
+        ticks = np.diff(stamp)[np.diff(sequence) == 1]
+        if len(ticks):
+            self._longest = max(self._longest, int(ticks.max()))
+            bins = np.clip(ticks // round(_TICK_RESOLUTION * 1e9), 0, _TICK_BINS - 1)
+            self.histogram += np.bincount(bins, minlength=_TICK_BINS)
+        ends = [
+            (int(row['sequence']), int(row['stamp']), int(row['late_samples']))
+            for row in (rows[0], rows[-1])
+        ]
+        self._first = self._first or ends[0]
+        self._last = ends[1]
+
+    @property
+    def last_stamp(self) -> int | None:
+        """Stamp of the last measurement [ns]."""
+        return self._last[1] if self._last else None
+
+    def result(self, sample_time: float) -> dict[str, Any]:
+        first = self._first or (0, 0, 0)
+        last = self._last or (0, 0, 0)
+        wall_time = (last[1] - first[1]) * 1e-9
+        stage_time = (last[0] - first[0]) * sample_time
+        return {
+            'real_time_factor': stage_time / wall_time if wall_time > 0.0 else None,
+            'tick_p50': self._quantile(0.5),
+            'tick_p99': self._quantile(0.99),
+            'tick_max': self._longest * 1e-9,
+            'wall_time': wall_time,
+            'late_samples': last[2] - first[2],
+        }
+
+    def _quantile(self, share: float) -> float | None:
+        total = int(self.histogram.sum())
+        if not total:
+            return None
+        number = int(np.searchsorted(np.cumsum(self.histogram), share * total))
+        return (number + 0.5) * _TICK_RESOLUTION

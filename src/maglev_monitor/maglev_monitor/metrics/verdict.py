@@ -1,0 +1,100 @@
+"""The verdict on a run: its figures against its limits. No ROS here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from maglev_model.axes import AXES
+from maglev_model.parameters import values
+from maglev_monitor.metrics.settings import Limits
+from maglev_monitor.report.units import angle_or_length, number
+
+
+def verdict(found: Mapping[str, Any], limits: Limits, *, complete: bool) -> dict[str, Any]:
+    """The last part of ``metrics.json``: verdict, its reasons and the limits that were checked.
+
+    :param found: the figures, as :meth:`~.run_metrics.RunMetrics.result` gathers them.
+    :param complete: whether the run reached its end; otherwise it is ``incomplete`` or a failure.
+    """
+    reasons = [f'fault in {fault}' for fault in found['faults']]
+    reasons += [*_axis_reasons(found, limits), *_step_reasons(found, limits)]
+    reasons += _other_reasons(found, limits)
+    if found['faults'] or (complete and reasons):
+        word = 'fail'
+    else:
+        word = 'pass' if complete else 'incomplete'
+    if not complete:
+        reasons.append('the run did not reach its end')
+    return {'verdict': word, 'reasons': reasons, 'limits': checked_limits(limits)}
+
+
+def checked_limits(limits: Limits) -> dict[str, Any]:
+    """The limits that are checked, by name; limits by axis as a mapping."""
+    checked: dict[str, Any] = {}
+    for name, value in values(limits).items():
+        if isinstance(value, tuple):
+            by_axis = {axis: bound for axis, bound in zip(AXES, value, strict=True) if bound >= 0}
+            if by_axis:
+                checked[name] = by_axis
+        elif value >= 0 and not (name.startswith('min_') and value == 0):
+            checked[name] = value
+    return checked
+
+
+def _axis_reasons(found: Mapping[str, Any], limits: Limits) -> Iterator[str]:
+    rows = (
+        ('mean_abs_error', 'mean |e|', limits.max_mean_error),
+        ('max_abs_error', 'largest |e|', limits.max_error),
+    )
+    for name, title, bounds in rows:
+        for axis, bound in zip(AXES, bounds, strict=True):
+            value = found['axes'][axis][name]
+            if value is None and found['steps']:
+                continue  # a run of steps tracks nothing
+            if bound < 0 or (value is not None and value <= bound):
+                continue
+            if value is None:
+                yield f'{title} of {axis} was not measured: no tracking'
+            else:
+                shown, allowed = angle_or_length(axis, value), angle_or_length(axis, bound)
+                yield f'{title} of {axis} is {shown}, allowed is {allowed}'
+
+
+def _step_reasons(found: Mapping[str, Any], limits: Limits) -> Iterator[str]:
+    for step in found['steps']:
+        axis = step['axis']
+        start, target = angle_or_length(axis, step['from']), angle_or_length(axis, step['to'])
+        name = f'step of {axis} from {start} to {target}'
+        if 0 <= limits.max_overshoot < step['overshoot_percent']:
+            overshoot, allowed = number(step['overshoot_percent']), number(limits.max_overshoot)
+            yield f'{name}: overshoot is {overshoot} %, allowed is {allowed} %'
+        for key, symbol, bound in (
+            ('settling_time', 't_s', limits.max_settling_time),
+            ('encoder_time', 't_enc', limits.max_encoder_time),
+        ):
+            value = step[key]
+            if bound < 0 or (value is not None and value <= bound):
+                continue
+            shown = f'{number(value)} s' if value is not None else 'never reached'
+            yield f'{name}: {symbol} is {shown}, allowed is {number(bound)} s'
+
+
+def _other_reasons(found: Mapping[str, Any], limits: Limits) -> Iterator[str]:
+    factor = found['timing']['real_time_factor'] or 0.0
+    upper = (
+        ('peak phase current', found['currents']['peak_phase'], limits.max_phase_current, ' A'),
+        ('number of missing samples', found['missing_samples'], limits.max_missing_samples, ''),
+        ('number of late samples', found['timing']['late_samples'], limits.max_late_samples, ''),
+    )
+    for title, value, bound, unit in upper:
+        if bound >= 0 and value > bound * (1.0 + 1e-9):
+            yield f'{title} is {number(value)}{unit}, allowed is {number(bound)}{unit}'
+    lower = (
+        ('real-time factor', factor, limits.min_real_time_factor),
+        ('number of measured samples', found['samples'], limits.min_samples),
+        ('number of measured steps', len(found['steps']), limits.min_steps),
+    )
+    for title, value, bound in lower:
+        if value < bound:
+            yield f'{title} is {number(value)}, at least {number(bound)} is wanted'

@@ -1,0 +1,87 @@
+"""Building blocks of self-contained HTML pages. No ROS here."""
+
+from __future__ import annotations
+
+import base64
+import html
+import os
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from maglev_monitor.report.drawing import Plot
+
+_CSS = """
+:root { --ink: #1d2733; --soft: #66727f; --line: #dfe4ea; --blue: #1f5fa8; }
+* { box-sizing: border-box; }
+body { font: 15px/1.55 system-ui, -apple-system, 'Segoe UI', Roboto, sans-serif; color: var(--ink);
+  margin: 0 auto; max-width: 1120px; padding: 2.2rem 1.4rem 4rem; background: #fff; }
+header { border-bottom: 3px solid var(--blue); padding-bottom: 1rem; margin-bottom: 1.4rem; }
+h1 { font-size: 1.7rem; margin: 0 0 .2rem; }
+h2 { font-size: 1.15rem; margin: 2.2rem 0 .4rem; }
+.sub, .caption, .note { color: var(--soft); }
+.caption { margin: .1rem 0 .6rem; max-width: 62rem; }
+.badge { display: inline-block; padding: .1rem .7rem; border-radius: 1rem; color: #fff;
+  font-size: .95rem; vertical-align: .25rem; margin-left: .6rem; }
+.pass { background: #2a8a62; } .fail { background: #b3321d; } .incomplete { background: #b07a10; }
+.cards { display: flex; flex-wrap: wrap; gap: .8rem; margin: 1rem 0; }
+.card { border: 1px solid var(--line); border-radius: .5rem; padding: .5rem .9rem; min-width:
+8.5rem; } .card b { display: block; font-size: 1.15rem; } .card span { color: var(--soft);
+font-size: .85rem; } table { border-collapse: collapse; margin: .3rem 0 1rem; font-variant-numeric:
+tabular-nums; } th, td { padding: .28rem .9rem; border-bottom: 1px solid var(--line); text-align:
+right; } th { color: var(--soft); font-weight: 600; } th:first-child, td:first-child { text-align:
+left; } ul { margin: .3rem 0; padding-left: 1.2rem; } img { max-width: 100%; height: auto; display:
+block; } @media print { body { max-width: none; padding: 0; } h2, img { break-inside: avoid; } }
+"""
+
+
+def page(title: str, parts: Iterable[str]) -> str:
+    """A whole page of parts that are HTML; nothing is fetched, empty parts are left out."""
+    head = (
+        '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f'<title>{html.escape(title)} — maglev stage</title><style>{_CSS}</style></head><body>'
+    )
+    return '\n'.join([head, *(part for part in parts if part), '</body></html>\n'])
+
+
+def write_page(path: Path, text: str) -> None:
+    """Write a file in one go. Raises OSError when the folder cannot be written."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(path.name + '.tmp')
+    temporary.write_text(text, encoding='utf-8')
+    os.replace(temporary, path)
+
+
+def header(title: str, verdict: str, words: Iterable[str]) -> str:
+    """The head of a page: its title, pass, fail or incomplete, and a line below."""
+    return (
+        f'<header><h1>{html.escape(title)}<span class="badge {verdict}">{verdict}</span></h1>'
+        f'<div class="sub">{html.escape(" · ".join(words))}</div></header>'
+    )
+
+
+def picture(plot: Plot) -> str:
+    """A figure with its heading and caption, its PNG embedded."""
+    image = base64.b64encode(plot.png).decode('ascii')
+    title = html.escape(plot.title)
+    return (
+        f'<h2>{title}</h2>\n<p class="caption">{html.escape(plot.caption)}</p>\n'
+        f'<img alt="{title}" src="data:image/png;base64,{image}">'
+    )
+
+
+def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table of plain text."""
+    head = ''.join(f'<th>{html.escape(name)}</th>' for name in heads)
+    body = ''.join(
+        '<tr>' + ''.join(f'<td>{html.escape(cell)}</td>' for cell in row) + '</tr>' for row in rows
+    )
+    return f'<table><tr>{head}</tr>{body}</table>'
+
+
+def bullets(title: str, lines: Sequence[str]) -> str:
+    """A list of plain text under a title; nothing when it is empty."""
+    if not lines:
+        return ''
+    items = ''.join(f'<li>{html.escape(line)}</li>' for line in lines)
+    return f'<p class="note">{title}:</p><ul>{items}</ul>'

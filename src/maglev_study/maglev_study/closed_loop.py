@@ -1,0 +1,141 @@
+"""The closed loop without ROS: regulator and simulated stage in one compiled loop."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maglev_controller import sample_step as law
+from maglev_controller.parameters import ControllerParameters
+from maglev_controller.regulator import MeasurementFault, Regulator
+from maglev_controller.sample_step import ControlArrays, control_step
+from maglev_model.compiled import compiled
+from maglev_plant.arrays import STATE, StageArrays
+from maglev_plant.dynamics import advance
+from maglev_plant.encoder import encode
+from maglev_plant.parameters import PlantParameters
+from maglev_plant.simulation import SimulatedStage
+
+FloatArray = NDArray[np.float64]
+
+
+class References(NamedTuple):
+    """A reference for n samples, (n, 5) each: y, x, z, phi, theta [m, rad] and derivatives."""
+
+    position: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+
+
+@dataclasses.dataclass(frozen=True)
+class Run:
+    """What happened in n samples of the closed loop; row k is sample k.
+
+    ``state`` (n, 10) true x1..x10 when the sample was taken; ``direct_current``,
+    ``quadrature_current`` (n, 4) commanded in answer [A]; ``saturated`` (n,) whether some current
+    was limited.
+    """
+
+    state: FloatArray
+    direct_current: FloatArray
+    quadrature_current: FloatArray
+    saturated: NDArray[np.bool_]
+
+    @property
+    def output(self) -> FloatArray:
+        """The true outputs y, x, z, phi, theta (n, 5) [m, rad]."""
+        return self.state[:, ::2]
+
+
+@compiled
+def _loop(
+    control: ControlArrays,
+    stage: StageArrays,
+    position: FloatArray,
+    velocity: FloatArray,
+    acceleration: FloatArray,
+    state: FloatArray,
+    current: FloatArray,
+    code: NDArray[np.int8],
+    delayed: bool,
+) -> int:
+    """All samples, or up to the first that the regulator refuses; returns how many went well."""
+    answer = np.zeros(8)
+    for k in range(position.shape[0]):
+        for i in range(10):
+            state[k, i] = stage.memory[STATE + i]
+        encode(stage.scalars, stage.memory, stage.reading)
+        code[k] = control_step(
+            control.constants,
+            control.law,
+            control.settings,
+            control.state,
+            control.telemetry,
+            control.scratch,
+            stage.reading[:4],
+            stage.reading[4],
+            stage.reading[5],
+            position[k],
+            velocity[k],
+            acceleration[k],
+            answer[:4],
+            answer[4:],
+        )
+        if code[k] > law.SATURATED:
+            return k
+        if delayed:
+            advance(stage.scalars, stage.axes, stage.memory, stage.command)
+        for i in range(8):
+            stage.command[i] = current[k, i] = answer[i]
+        if not delayed:
+            advance(stage.scalars, stage.axes, stage.memory, stage.command)
+    return int(position.shape[0])
+
+
+def run(
+    regulator: Regulator,
+    stage: SimulatedStage,
+    references: References,
+    *,
+    delayed: bool = False,
+) -> Run:
+    """Carry the stage along a reference, from the sample it stands at; both keep their states.
+
+    With ``delayed`` the currents take effect one sample late, as in real time. Otherwise this is
+    bit for bit what :meth:`Regulator.step` and the stage's ``read`` and ``write`` give in turn.
+    Raises ValueError for references of another shape than (n, 5), and :class:`MeasurementFault`,
+    naming the sample, when the regulator refuses one.
+    """
+    position, velocity, acceleration = (
+        np.ascontiguousarray(array, dtype=np.float64) for array in references
+    )
+    n = position.shape[0]
+    for name, array in zip(References._fields, (position, velocity, acceleration), strict=True):
+        if array.shape != (n, 5):
+            raise ValueError(f'{name} must have shape ({n}, 5), not {array.shape}')
+    state, current = np.empty((n, 10)), np.empty((n, 8))
+    code = np.zeros(n, dtype=np.int8)
+    arrays = stage.arrays
+    done = _loop(
+        regulator.arrays, arrays, position, velocity, acceleration, state, current, code, delayed
+    )
+    if done < n:
+        gap, x, z = arrays.reading[:4], float(arrays.reading[4]), float(arrays.reading[5])
+        raise MeasurementFault(f'sample {done}: {regulator.describe(int(code[done]), gap, x, z)}')
+    return Run(state, current[:, :4], current[:, 4:], code == law.SATURATED)
+
+
+def warm_up() -> None:
+    """Compile all that the loop, the regulator and the stage need, or load it from the cache."""
+    zero = np.zeros((2, 5))
+    rest = zero + np.array([0.031, 0.0, 0.0, 0.0, 0.0])
+    stage, regulator = SimulatedStage(PlantParameters()), Regulator(ControllerParameters())
+    run(regulator, stage, References(rest, zero, zero))
+    direct, quadrature = np.zeros(4), np.zeros(4)
+    sample = stage.read()
+    regulator.step(*sample, rest[0], zero[0], zero[0], direct, quadrature)
+    stage.write(direct, quadrature)
+    stage.read()

@@ -1,0 +1,152 @@
+"""One law in flight: approach a set-point, then run an experiment from there."""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maglev_controller.parameters import ControllerParameters
+from maglev_controller.regulator import MeasurementFault, Regulator
+from maglev_plant.simulation import SimulatedStage
+from maglev_study.closed_loop import References, Run, run
+from maglev_study.comparison.contestants import Contestant
+
+FloatArray = NDArray[np.float64]
+
+Y, X, Z, PHI, THETA = range(5)
+HOVER = np.array([0.025, 0.0, 0.0, 0.0, 0.0])
+OMEGA = 1.5 * math.pi
+"""ω0 of the ellipse [rad/s]."""
+
+SETTLED = 1e-4
+"""Error below which a step has settled [m, rad], the paper's t_s."""
+
+ENCODER = (1e-5, 1e-5, 1e-5, 2e-5, 2e-5)
+"""Resolution of the encoders [m, rad], the paper's t_enc."""
+
+_AT_STOP = 1e-6
+
+
+@functools.lru_cache(maxsize=8)
+def _designed(parameters: ControllerParameters) -> Regulator:
+    return Regulator(parameters)
+
+
+class Step(NamedTuple):
+    """A step response as the paper judges it; ``settling`` is infinite when it does not settle."""
+
+    overshoot: float  # [%]
+    settling: float  # error goes and stays below the bound [s]
+
+
+class Flight:
+    """A stage that hovers at 25 mm, and the regulator that carries it.
+
+    Flights of one law share its regulator, which begins anew with each: one at a time.
+    """
+
+    def __init__(self, contestant: Contestant, **overrides: object) -> None:
+        """``overrides`` are the stage's, dots written as ``__``."""
+        parameters = contestant.stage(initial__position=tuple(HOVER), **overrides)
+        self.period = parameters.sample_time
+        self.regulator = _designed(contestant.controller)
+        self.regulator.reset()
+        self.stage = SimulatedStage(parameters)
+        machine = parameters.machine
+        free = ~np.array(parameters.guide.locked)
+        self._free = free
+        self._lower = np.array(machine.lower_limit)[free] + _AT_STOP
+        self._upper = np.array(machine.upper_limit)[free] - _AT_STOP
+        self.seat_radius = parameters.stop.seat_radius
+
+    def follow(self, references: References) -> Run | None:
+        """Carry on along a reference; None when the platen meets a stop or is given up."""
+        try:
+            outcome = run(self.regulator, self.stage, references)
+        except MeasurementFault:
+            return None
+        return None if self._met_stop(outcome.output) else outcome
+
+    def _met_stop(self, output: FloatArray) -> bool:
+        reach = self.seat_radius * np.abs(output[:, PHI:]).max(axis=1)
+        free = output[:, self._free]
+        seated = (output[:, Y] - reach <= self._lower[Y]) | (output[:, Y] + reach >= self._upper[Y])
+        return bool(seated.any() or np.any(free <= self._lower) or np.any(free >= self._upper))
+
+    def approach(self, goal: FloatArray, time: float = 4.0, hold: float = 5.0) -> bool:
+        """Go from 25 mm to a set-point (5,) in ``time`` [s] and hold it; false when that fails."""
+        return self.follow(shaped(HOVER, goal, time, hold, self.period)) is not None
+
+    def save(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """All that changes with time, for :meth:`restore`."""
+        arrays = self.stage.arrays
+        return arrays.memory.copy(), arrays.command.copy(), self.regulator.arrays.state.copy()
+
+    def restore(self, saved: tuple[FloatArray, FloatArray, FloatArray]) -> None:
+        """Go back to what was saved."""
+        arrays = self.stage.arrays
+        arrays.memory[:], arrays.command[:], self.regulator.arrays.state[:] = saved
+
+    def step(self, begin: FloatArray, target: FloatArray, time: float, hold: float) -> Run | None:
+        """A step from the set-point ``begin`` to ``target`` (5,), raw for ``time`` 0 [s].
+
+        Lasts ``hold`` [s] in all; None when the platen is lost.
+        """
+        if self.regulator.parameters.internal_model.restart_at_step:
+            self.regulator.reset()
+        if time > 0.0:
+            return self.follow(shaped(begin, target, time, hold - time, self.period))
+        return self.follow(held(target, hold, self.period))
+
+
+def held(position: FloatArray, duration: float, period: float) -> References:
+    """A set-point (5,) held for ``duration`` [s]."""
+    n = round(duration / period)
+    return References(np.tile(position, (n, 1)), np.zeros((n, 5)), np.zeros((n, 5)))
+
+
+def shaped(
+    start: FloatArray, goal: FloatArray, time: float, hold: float, period: float
+) -> References:
+    """Minimum-jerk from one set-point to another in ``time`` [s], then held."""
+    s = np.minimum(period * np.arange(round((time + hold) / period)) / time, 1.0)[:, None]
+    way = goal - start
+    return References(
+        start + way * (10 * s**3 - 15 * s**4 + 6 * s**5),
+        way / time * (30 * s**2 - 60 * s**3 + 30 * s**4),
+        way / time**2 * (60 * s - 180 * s**2 + 120 * s**3),
+    )
+
+
+def ellipse(duration: float, theta: float, period: float) -> References:
+    """The paper's ellipse for ``duration`` [s], grown from 25 mm in the first two seconds.
+
+    In 3DOF with ``theta`` 0, in 4DOF with 0.01 rad.
+    """
+    grow = 2.0
+    amplitude = np.array([0.005, 0.03, 0.03, 0.0, theta])
+    time = period * np.arange(round(duration / period))[:, None]
+    angle = OMEGA * time + np.array([-math.pi / 2, -math.pi / 2, 0.0, 0.0, 0.0])
+    s = np.minimum(time / grow, 1.0)
+    scale = 10 * s**3 - 15 * s**4 + 6 * s**5
+    rate = (30 * s**2 - 60 * s**3 + 30 * s**4) / grow
+    bend = (60 * s - 180 * s**2 + 120 * s**3) / grow**2
+    sine, cosine = amplitude * np.sin(angle), amplitude * OMEGA * np.cos(angle)
+    return References(
+        HOVER + scale * sine,
+        rate * sine + scale * cosine,
+        bend * sine + 2.0 * rate * cosine - scale * OMEGA**2 * sine,
+    )
+
+
+def judge(response: FloatArray, start: float, end: float, bound: float, period: float) -> Step:
+    """Overshoot of a response (n,) that begins with the step, and when it settles to ``bound``."""
+    outside = np.nonzero(np.abs(response - end) > bound)[0]
+    settling = period * (float(outside[-1]) + 1.0) if outside.size else 0.0
+    if outside.size and outside[-1] == response.size - 1:
+        settling = math.inf
+    return Step(max(0.0, 100.0 * float(np.max((response - end) / (end - start)))), settling)

@@ -1,0 +1,151 @@
+"""``compare``: all control laws over the same experiments, without ROS."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from maglev_controller.laws import control_law
+from maglev_model.parameters import ParameterError, replace
+from maglev_study.closed_loop import warm_up
+from maglev_study.comparison.contestants import Contestant, find_contestants
+from maglev_study.comparison.experiments import Row, loops, steps, tracking
+from maglev_study.comparison.flight import THETA, X, Y
+from maglev_study.comparison.region import Region, region
+from maglev_study.comparison.table import table, to_json
+
+_WITH_COMPENSATOR = ('jacobian_lead_lag', 'feedback_lead_lag', 'feedback_soi')
+
+
+class Part(NamedTuple):
+    """A part of the work on one law, done by one process."""
+
+    law: str
+    name: str
+    work: Callable[..., Any]
+    arguments: tuple[Any, ...]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point of the executable ``compare``; the exit code."""
+    options = _parser().parse_args(arguments)
+    try:
+        contestants = _contestants(options)
+        out = _folder(options.out)
+    except ParameterError as error:
+        print(f'compare: error: {error}', file=sys.stderr)
+        return 2
+    print('the closed loop as a library, without ROS: the graph would take hours', flush=True)
+    started = time.monotonic()
+    warm_up()
+    try:
+        rows, regions = _compare(contestants, options.quick)
+    except KeyboardInterrupt:
+        print('compare: interrupted', file=sys.stderr)
+        return 130
+    text = table(rows, regions)
+    print('\n' + text + '\n', flush=True)
+    from maglev_study.comparison.plot import draw_regions
+
+    facts = {'quick': options.quick, 'bandwidth': options.bandwidth}
+    (out / 'comparison.txt').write_text(text + '\n', encoding='utf-8')
+    (out / 'comparison.json').write_text(to_json(rows, regions, facts), encoding='utf-8')
+    draw_regions(regions, out / 'regions.png')
+    print(f'compare: done in {time.monotonic() - started:.0f} s')
+    for name in ('comparison.txt', 'comparison.json', 'regions.png'):
+        print(f'  {out / name}')
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog='compare', description=__doc__)
+    parser.add_argument('--params', type=Path, required=True, help='the folder of parameter files')
+    parser.add_argument('--out', type=Path, required=True, help='where the results are left')
+    parser.add_argument('--quick', action='store_true', help='coarse regions, short windows')
+    parser.add_argument(
+        '--laws', nargs='+', default=[], metavar='NAME', help='only these (default all)'
+    )
+    parser.add_argument(
+        '--bandwidth',
+        type=float,
+        metavar='RAD_S',
+        help='crossover of the laws with compensators on all axes (default: as in their files)',
+    )
+    return parser
+
+
+def _contestants(options: argparse.Namespace) -> list[Contestant]:
+    found = find_contestants(options.params, options.laws)
+    if options.bandwidth is not None:
+        change = {'compensator.crossover': (options.bandwidth,) * 5}
+        found = [
+            dataclasses.replace(one, controller=replace(one.controller, change))
+            if one.controller.law in _WITH_COMPENSATOR
+            else one
+            for one in found
+        ]
+    for one in found:
+        law = control_law(one.controller)
+        law.design(one.controller, 'y')
+    return found
+
+
+def _folder(path: Path) -> Path:
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        probe = path / '.try'
+        probe.write_bytes(bytes(65536))
+        probe.unlink()
+    except OSError as error:
+        raise ParameterError(f"cannot write to '{path}': {error.strerror}") from error
+    return path.resolve()
+
+
+def _parts(contestants: Sequence[Contestant], quick: bool) -> Iterator[Part]:
+    for one in contestants:
+        yield Part(one.name, 'loops', loops, (one,))
+        yield Part(one.name, 'steps', steps, (one,))
+        yield Part(one.name, 'tracking', tracking, (one, 5.0 if quick else 30.0))
+        for axis in (Y, X, THETA):
+            yield Part(one.name, f'region {axis}', region, (one, axis, quick))
+
+
+def _compare(
+    contestants: Sequence[Contestant], quick: bool
+) -> tuple[dict[str, list[Row]], dict[str, list[Region]]]:
+    parts = list(_parts(contestants, quick))
+    with ProcessPoolExecutor(max_workers=max(1, len(os.sched_getaffinity(0)))) as pool:
+        found = _run(pool, parts)
+    names = [one.name for one in contestants]
+    rows = {
+        name: found[name, 'loops'] + found[name, 'steps'] + found[name, 'tracking']
+        for name in names
+    }
+    regions = {name: [found[name, f'region {axis}'] for axis in (Y, X, THETA)] for name in names}
+    return rows, regions
+
+
+def _run(pool: Executor, parts: Sequence[Part]) -> dict[tuple[str, str], Any]:
+    """The results by law and part; the work that is left is dropped when one fails."""
+    futures = {pool.submit(part.work, *part.arguments): part for part in parts}
+    found: dict[tuple[str, str], Any] = {}
+    try:
+        for future in as_completed(futures):
+            part = futures[future]
+            found[part.law, part.name] = future.result()
+            print(f'  {len(found)}/{len(parts)} {part.law}: {part.name}', flush=True)
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        raise
+    return found
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,287 @@
+"""``paper_tables FOLDER``: the paper's experiments, its figures beside a simulation's. No ROS here.
+
+The folder holds a folder of runs for each controller, named as in :data:`CONTROLLERS`, with a run
+for each scenario in it: ``paper/steps``, ``ours/ellipse`` and so on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import html
+import json
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from maglev_model.axes import AXES
+from maglev_monitor.bag.analysis import Analysis, analyse
+from maglev_monitor.bag.writer import BagError
+from maglev_monitor.report.units import angle_or_length, micro, seconds
+from maglev_study.paper import SCENARIOS, STEPS, TRACKING, WINDOW, PublishedStep
+
+CONTROLLERS = {'paper': "the paper's law, simulated", 'ours': 'ours, simulated'}
+"""Folders of runs, and what their controllers are called."""
+
+HEADS = ('', "the paper's machine", *CONTROLLERS.values())
+PASS, NOT_PASSED, NOTHING = 0, 1, 2
+
+_UNKNOWN = '–'
+_NOTES = (
+    "The paper's machine: its own figures, measured with its encoders; with < or > the limits of "
+    'its Table III.',
+    "The paper's law: its regulator (14) to (17) and published poles; with the exact inverse in "
+    "place of (12), which with Table I's values misses more than the paper measured.",
+    'Both are simulated on the benchmark plant: the full model (6), (7), 10 µm encoders, 7 A '
+    "amplifiers, and guide friction fitted to the paper's errors. Errors are those of the true "
+    'position, in a step against its target.',
+    "The paper's law is given jumps, as on the machine; our steps are rounded off within 0.2 s. "
+    'Times count from the first sample of the step for both.',
+    't_s is the time after which |e| stays below 0.1 mm or 0.1 mrad, t_enc that after which it '
+    'stays within 10 µm or 20 µrad: going there and leaving again does not count.',
+)
+
+
+class Run(NamedTuple):
+    """One run of a controller: its figures and series, None where there are none; what is wrong."""
+
+    controller: str
+    scenario: str
+    result: dict[str, Any] | None
+    analysis: Analysis | None
+    problem: str
+
+
+def load_run(folder: Path, controller: str, scenario: str) -> Run:
+    """Read the run ``folder/controller/scenario``; what cannot be read becomes its problem."""
+    path = folder / controller / scenario
+    try:
+        result = json.loads((path / 'metrics.json').read_text(encoding='utf-8'))
+        problem = '' if result['verdict'] == 'pass' else _failure(result)
+    except OSError:
+        return Run(
+            controller, scenario, None, None, 'it has not finished: there is no metrics.json'
+        )
+    except (ValueError, KeyError, TypeError):
+        return Run(controller, scenario, None, None, 'its metrics.json is damaged')
+    try:
+        analysis = analyse(path)
+    except BagError as error:
+        return Run(controller, scenario, result, None, problem or str(error))
+    problem = problem or ''.join(analysis.notes[:1]) or _missing(scenario, result)
+    return Run(controller, scenario, result, analysis, problem)
+
+
+def rows(runs: Sequence[Run]) -> Iterator[tuple[str, ...]]:
+    """The lines of the table, cell by cell, as :data:`HEADS`; a heading is a line of one cell."""
+    found = {(run.controller, run.scenario): run.result for run in runs}
+    for scenario, published in TRACKING.items():
+        results = [found.get((controller, scenario)) for controller in CONTROLLERS]
+        yield (f'{published.title}: mean |e| over {_windows(results)}',)
+        for axis in AXES:
+            given = published.mean_error.get(axis)
+            yield (
+                axis,
+                _UNKNOWN if given is None else _as_published(axis, given),
+                *(_mean_error(result, axis) for result in results),
+            )
+    yield ('steps: overshoot, t_s, t_enc',)
+    results = [found.get((controller, 'steps')) for controller in CONTROLLERS]
+    for step in STEPS:
+        start, target = (angle_or_length(step.axis, value) for value in (step.start, step.target))
+        yield (
+            f'{step.axis}, {start.split()[0]} → {target}',
+            f'{step.overshoot}, {step.settling_time}, {step.encoder_time}',
+            *(_step_cell(result, step) for result in results),
+        )
+
+
+def markdown(runs: Sequence[Run]) -> str:
+    """The table in Markdown, ending with a line feed."""
+    lines = [_markdown_row(HEADS), '|:--' + '|--:' * (len(HEADS) - 1) + '|']
+    for row in rows(runs):
+        cells = row if len(row) > 1 else (f'**{row[0]}**', *[''] * (len(HEADS) - 1))
+        lines.append(_markdown_row(cells))
+    return '\n'.join(lines) + '\n'
+
+
+def render(runs: Sequence[Run]) -> str:
+    """The whole page as HTML; figures are embedded, nothing is fetched."""
+    from maglev_monitor.report.page import bullets, header, page, picture, table
+    from maglev_study.paper_plots import paper_plots
+
+    analyses: dict[str, dict[str, Analysis]] = {}
+    for run in runs:
+        if run.analysis is not None:
+            named = analyses.setdefault(run.scenario, {})
+            named[CONTROLLERS[run.controller]] = run.analysis
+    failed = [_problem_line(run) for run in runs if run.problem]
+    title = "The paper's experiments"
+    parts = [
+        header(title, 'fail' if failed else 'pass', _header_words(runs)),
+        bullets('Failed', failed),
+        _html_table(runs),
+        bullets('How to read it', _NOTES),
+        *(picture(plot) for plot in paper_plots(analyses)),
+        '<h2>Runs</h2>',
+        table(['run', 'verdict', 'mode', 'measured', 'peak phase current'], _run_rows(runs)),
+    ]
+    return page(title, parts)
+
+
+def paper_tables(arguments: Sequence[str] | None = None) -> int:
+    """Run the command and return its exit code.
+
+    0: all runs are there and passed; 1: not all, the page is written all the same; 2: there is no
+    run, or the page cannot be written.
+    """
+    options = _parser().parse_args(arguments)
+    runs = [
+        load_run(options.folder, controller, scenario)
+        for scenario in SCENARIOS
+        for controller in CONTROLLERS
+    ]
+    if all(run.result is None for run in runs):
+        example = options.folder / next(iter(CONTROLLERS)) / SCENARIOS[0]
+        return _error(f"there is no finished run in '{options.folder}', such as '{example}'")
+    out = options.out or options.folder
+    text = markdown(runs)
+    try:
+        _write(out, runs, text)
+    except OSError as error:
+        return _error(f"cannot write to '{out}': {error.strerror}")
+    print(text)
+    for run in runs:
+        if run.problem:
+            print(f'paper_tables: {_problem_line(run)}', file=sys.stderr)
+    print(f'page: {out / "paper_tables.html"}')
+    return NOT_PASSED if any(run.problem for run in runs) else PASS
+
+
+def main() -> None:
+    """Entry point of the executable."""
+    sys.exit(paper_tables())
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog='paper_tables', description="The paper's figures beside those of finished runs."
+    )
+    parser.add_argument(
+        'folder',
+        type=Path,
+        metavar='FOLDER',
+        help='with runs in it: '
+        + ', '.join(f'{name}/{SCENARIOS[0]}' for name in CONTROLLERS)
+        + ' and so on',
+    )
+    parser.add_argument(
+        '--out', type=Path, metavar='DIR', help='where the page goes (default: the folder)'
+    )
+    return parser
+
+
+def _error(message: str) -> int:
+    print(f'paper_tables: error: {message}', file=sys.stderr)
+    return NOTHING
+
+
+def _write(out: Path, runs: Sequence[Run], text: str) -> None:
+    from maglev_monitor.report.page import write_page  # matplotlib takes a second to load
+
+    out.mkdir(parents=True, exist_ok=True)
+    write_page(out / 'paper_tables.md', text)
+    write_page(out / 'paper_tables.html', render(runs))
+
+
+def _failure(result: Mapping[str, Any]) -> str:
+    reasons = result['reasons']
+    return f'{result["verdict"]}: {reasons[0]}' if reasons else str(result['verdict'])
+
+
+def _missing(scenario: str, result: Mapping[str, Any]) -> str:
+    """What a run of the scenario must hold and this one does not."""
+    if scenario in TRACKING:
+        tracked = result['axes']['y']['mean_abs_error'] is not None
+        return '' if tracked else 'it tracked nothing'
+    lost = [step for step in STEPS if _find(result, step) is None]
+    if not lost:
+        return ''
+    first = f'{lost[0].axis} to {angle_or_length(lost[0].axis, lost[0].target)}'
+    return f'{len(lost)} of {len(STEPS)} steps are missing, first that of {first}'
+
+
+def _find(result: Mapping[str, Any], step: PublishedStep) -> Mapping[str, Any] | None:
+    for found in result['steps']:
+        if found['axis'] == step.axis and all(
+            abs(found[key] - value) < 1e-9
+            for key, value in (('from', step.start), ('to', step.target))
+        ):
+            match: Mapping[str, Any] = found
+            return match
+    return None
+
+
+def _step_cell(result: Mapping[str, Any] | None, step: PublishedStep) -> str:
+    found = None if result is None else _find(result, step)
+    if found is None:
+        return _UNKNOWN
+    times = (_two_digits(found['settling_time']), _two_digits(found['encoder_time']))
+    return f'{found["overshoot_percent"]:.1f} %, {times[0]}, {times[1]}'
+
+
+def _two_digits(time: float | None) -> str:
+    return seconds(time) if time is None else f'{time:.2f} s'
+
+
+def _mean_error(result: Mapping[str, Any] | None, axis: str) -> str:
+    return micro(axis, None if result is None else result['axes'][axis]['mean_abs_error'])
+
+
+def _as_published(axis: str, value: float) -> str:
+    return f'{value * 1e6:.4g} µ{"rad" if axis in ("phi", "theta") else "m"}'
+
+
+def _windows(results: Sequence[Mapping[str, Any] | None]) -> str:
+    """The paper's measured time, and the simulated ones where they differ."""
+    times = {float(result['duration']) for result in results if result is not None}
+    if all(abs(time - WINDOW) < 1e-6 for time in times):
+        return f'{WINDOW:g} s'
+    simulated = ' and '.join(f'{time:g}' for time in sorted(times))
+    return f'{WINDOW:g} s, simulated over {simulated} s'
+
+
+def _header_words(runs: Sequence[Run]) -> Iterator[str]:
+    known = [run.result for run in runs if run.result is not None]
+    for key in ('stage', 'mode'):
+        yield ' and '.join(sorted({str(result[key]) for result in known if result[key]}))
+    yield f'{sum(not run.problem for run in runs)} of {len(runs)} runs passed'
+
+
+def _problem_line(run: Run) -> str:
+    return f'{CONTROLLERS[run.controller]}, {run.scenario}: {run.problem}'
+
+
+def _run_rows(runs: Sequence[Run]) -> Iterator[list[str]]:
+    for run in runs:
+        if run.result is not None:
+            yield [
+                f'{run.controller}/{run.scenario}',
+                run.result['verdict'],
+                run.result['mode'],
+                f'{run.result["duration"]:g} s',
+                f'{run.result["currents"]["peak_phase"]:.2f} A',
+            ]
+
+
+def _markdown_row(cells: Sequence[str]) -> str:
+    return '| ' + ' | '.join(cell.replace('|', '\\|') for cell in cells) + ' |'
+
+
+def _html_table(runs: Sequence[Run]) -> str:
+    lines = ['<table><tr>', *(f'<th>{html.escape(head)}</th>' for head in HEADS), '</tr>']
+    for row in rows(runs):
+        kind, span = ('th', f' colspan="{len(HEADS)}"') if len(row) == 1 else ('td', '')
+        cells = ''.join(f'<{kind}{span}>{html.escape(cell)}</{kind}>' for cell in row)
+        lines.append(f'<tr>{cells}</tr>')
+    return ''.join([*lines, '</table>'])

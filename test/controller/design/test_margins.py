@@ -1,0 +1,203 @@
+"""Poles and margins against python-control, and what is refused."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import control
+import numpy as np
+import pytest
+
+from maglev_controller.design.gains import design_axis
+from maglev_controller.design.margins import (
+    closed_loop,
+    controller_system,
+    loop_margins,
+    plant_system,
+)
+from maglev_controller.parameters import ControllerParameters
+from maglev_controller.regulator import Regulator
+from maglev_model.parameters import ParameterError, build, read_yaml
+
+PARAMS = Path(__file__).parents[3] / 'params'
+PERIOD = 1e-3
+HOVER = np.array([0.025, 0.0, 0.0, 0.0, 0.0])
+
+
+def parameters(*overlays: str, **overrides: object) -> ControllerParameters:
+    """Defaults with overlays from params/ and single parameters, dots written ``__``."""
+    found: dict[str, object] = {}
+    for name in overlays:
+        found.update(read_yaml(PARAMS / name, 'controller'))
+    found.update({name.replace('__', '.'): value for name, value in overrides.items()})
+    return build(ControllerParameters, found)
+
+
+CHOICES = [
+    parameters(),
+    parameters(input_delay=1),
+    parameters(rate_estimate='derivative'),
+    parameters('paper.yaml'),
+]
+
+
+@pytest.mark.parametrize('chosen', CHOICES, ids=['default', 'delay', 'derivative', 'paper'])
+def test_the_controller_system_is_what_the_regulator_computes(chosen: ControllerParameters) -> None:
+    """The same errors in, the same w out, sample by sample."""
+    regulator = Regulator(chosen)
+    system = controller_system(regulator.designs[1], PERIOD, chosen.input_delay)
+    rng = np.random.default_rng(2)
+    state, direct, quadrature, zero = np.zeros(system.input.size), *np.zeros((2, 4)), np.zeros(5)
+    regulator.step(np.full(4, 0.025), 0.0, 0.0, HOVER, zero, zero, direct, quadrature)
+    for _ in range(60):
+        error = 1e-6 * rng.normal()
+        regulator.step(np.full(4, 0.025), error, 0.0, HOVER, zero, zero, direct, quadrature)
+        wanted = system.output @ state + system.direct * error
+        assert regulator.virtual_input[1] == pytest.approx(wanted, rel=1e-9, abs=1e-12)
+        state = system.state @ state + system.input * error
+
+
+@pytest.mark.parametrize('delay', [0, 1, 3])
+def test_the_plant_is_python_controls(delay: int) -> None:
+    """Stiffness and friction included, sampled with w held, then delayed."""
+    continuous = control.ss([[0.0, 1.0], [1700.0, -300.0]], [[0.0], [1.0]], [[1.0, 0.0]], 0.0)
+    wanted = control.sample_system(continuous, PERIOD, method='zoh')
+    found = control.ss(
+        *_matrices(plant_system(PERIOD, delay, stiffness=1700.0, friction=300.0)), PERIOD
+    )
+    z = np.exp(1j * PERIOD * np.geomspace(1.0, 3000.0, 20))
+    np.testing.assert_allclose(found(z), wanted(z) / z**delay, rtol=1e-7)
+
+
+def _matrices(system: object) -> tuple[np.ndarray, ...]:
+    state, drive, output, direct = system  # type: ignore[misc]
+    return state, drive[:, None], output[None, :], np.array([[direct]])
+
+
+@pytest.mark.parametrize('chosen', CHOICES, ids=['default', 'delay', 'derivative', 'paper'])
+def test_margins_are_python_controls(chosen: ControllerParameters) -> None:
+    """Crossover, phase and gain margin, sensitivity peak and poles, by its own algorithms."""
+    delay = chosen.input_delay
+    found = loop_margins(design_axis(chosen, 'y'), PERIOD, delay=delay, designed=delay)
+    controller = control.ss(
+        *_matrices(controller_system(design_axis(chosen, 'y'), PERIOD, delay)), PERIOD
+    )
+    loop = -control.ss(*_matrices(plant_system(PERIOD, delay)), PERIOD) * controller
+    poles = control.feedback(loop, 1).poles()
+    assert found.spectral_radius == pytest.approx(np.abs(poles).max(), abs=1e-6)
+    at = complex(loop(np.exp(1j * found.crossover * PERIOD)))
+    assert abs(at) == pytest.approx(1.0, rel=1e-3)
+    assert math.degrees(np.angle(-at)) == pytest.approx(found.phase, abs=0.1)
+    for factor in (found.gain_up, found.gain_down):
+        edge = [
+            np.abs(control.feedback(f * loop, 1).poles()).max()
+            for f in (factor * 0.99, factor * 1.01)
+        ]
+        assert min(edge) < 1.0 < max(edge)
+    omega = np.linspace(5.0, 3000.0, 8000)
+    peak = np.max(1.0 / np.abs(1.0 + loop(np.exp(1j * PERIOD * omega))))
+    assert found.sensitivity == pytest.approx(peak, rel=0.01)
+
+
+@pytest.mark.parametrize('slope', [10.0, 200.0, 1320.0, 1500.0])
+@pytest.mark.parametrize('delay', [0, 1])
+def test_friction_at_rest_leaves_the_default_stable(slope: float, delay: int) -> None:
+    """For every slope up to the parameter's, also with currents that come a sample late."""
+    controller = controller_system(design_axis(parameters(), 'theta'), PERIOD, 0)
+    loop = closed_loop(controller, plant_system(PERIOD, delay, friction=slope))
+    assert np.abs(np.linalg.eigvals(loop)).max() < 1.0
+
+
+def test_oscillators_with_the_lqrs_own_phase_hunt_with_friction_at_rest() -> None:
+    """The slope of the benchmark plant's tilts, 1320 1/s, is enough; half-way turned it is not."""
+    alike: dict[str, object] = {'theta__weight_model': (5e10,)}
+    own = design_axis(parameters(**alike, internal_model__friction_slope=0.0), 'theta')
+    turned = design_axis(parameters(**alike), 'theta')
+    radius = []
+    for design in (own, turned):
+        plant = plant_system(PERIOD, friction=1320.0)
+        loop = closed_loop(controller_system(design, PERIOD, 0), plant)
+        radius.append(np.abs(np.linalg.eigvals(loop)).max())
+    assert radius[0] > 1.0 > radius[1]
+    found = loop_margins(own, PERIOD, slope=1500.0)
+    assert 800.0 < found.friction_slope < 1320.0
+
+
+def test_the_default_stands_delay_and_wrong_gains() -> None:
+    """Two samples late, or one with a third to 1.5 times the model's gain."""
+    controller = controller_system(design_axis(parameters(), 'x'), PERIOD, 0)
+    for delay in (0, 1, 2):
+        loop = closed_loop(controller, plant_system(PERIOD, delay))
+        assert np.abs(np.linalg.eigvals(loop)).max() < 1.0
+    for factor in (0.33, 0.9, 1.1, 1.5):
+        scaled = controller._replace(
+            direct=factor * controller.direct, output=factor * controller.output
+        )
+        loop = closed_loop(scaled, plant_system(PERIOD, 1))
+        assert np.abs(np.linalg.eigvals(loop)).max() < 1.0
+
+
+def test_designing_for_the_delay_gives_margin_back() -> None:
+    """With ``input_delay`` the observer predicts over it."""
+    late = loop_margins(design_axis(parameters(), 'y'), PERIOD, delay=1)
+    chosen = parameters(input_delay=1)
+    designed = loop_margins(design_axis(chosen, 'y'), PERIOD, delay=1, designed=1)
+    assert designed.phase > late.phase + 8.0
+    assert designed.sensitivity < late.sensitivity - 0.5
+
+
+@pytest.mark.parametrize(
+    ('overrides', 'reason'),
+    [
+        (
+            {'rate_estimate': 'derivative', 'y__weight_error': 1e13},
+            'y: with these gains .* unstable at a sample time of 0.001 s',
+        ),
+        (
+            {
+                'rate_estimate': 'derivative',
+                'x__design': 'poles',
+                'x__multiples': (),
+                'x__poles_real': (-2000.0, -2000.0),
+                'x__poles_imaginary': (0.0, 0.0),
+            },
+            'x: with these gains .* the loop is unstable',
+        ),
+        ({'margins__phase': 60.0}, r"y: the phase margin is 4\d\.\d deg, 'margins.phase' asks for"),
+        ({'margins__gain': 6.0}, r"y: the gain margin is a factor 3\.\d+, 'margins.gain' asks for"),
+        ({'margins__sensitivity': 1.2}, r"y: the sensitivity peaks at 1\.6\d, 'margins.sensi"),
+        (
+            {
+                'theta__weight_error': 1e8,
+                'theta__weight_rate': 2e4,
+                'theta__weight_model': (1e10,),
+            },
+            'theta: standing still hunts with friction steeper',
+        ),
+        ({'rate_estimate': 'derivative', 'input_delay': 1}, "y: the phase .* 'margins.override'"),
+    ],
+)
+def test_what_falls_short_is_refused(overrides: dict[str, object], reason: str) -> None:
+    """With the axis, the figure and the bound; the same with override is taken unless unstable."""
+    with pytest.raises(ParameterError, match=reason):
+        Regulator(parameters(**overrides))
+    if 'unstable' in reason:
+        with pytest.raises(ParameterError, match=reason):
+            Regulator(parameters(**overrides, margins__override=True))
+    else:
+        Regulator(parameters(**overrides, margins__override=True))
+
+
+def test_an_axis_without_control_is_not_judged() -> None:
+    """Its gains are not used."""
+    wild = {'phi__weight_error': 1e13, 'phi__controlled': False}
+    assert len(Regulator(parameters(**wild)).describe_loops()) == 4
+
+
+def test_the_log_says_it_all() -> None:
+    """One line for each axis."""
+    lines = Regulator(parameters()).describe_loops()
+    assert [line.split(':')[0] for line in lines] == ['y', 'x', 'z', 'phi', 'theta']
+    for word in ('crossover', 'phase margin', 'gain margin', 'sensitivity peak', 'friction', '±'):
+        assert word in lines[4]

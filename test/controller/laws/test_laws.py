@@ -1,0 +1,239 @@
+"""The control laws at configuration: loop shapes, linearisation, refusals."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import control
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from maglev_controller.design.gains import AxisDesign
+from maglev_controller.design.margins import loop_margins
+from maglev_controller.laws import CONTROL_LAWS, control_law
+from maglev_controller.parameters import LAWS, ControllerParameters
+from maglev_controller.regulator import Regulator
+from maglev_model.axes import AXES
+from maglev_model.equilibrium import equilibrium_current, equilibrium_inverse, stiffness
+from maglev_model.inverse import Limits
+from maglev_model.machine import MachineParameters, machine_constants
+from maglev_model.parameters import ParameterError, build, read_yaml
+from maglev_model.platen import accelerations
+from maglev_plant.parameters import PlantParameters
+
+PARAMS = Path(__file__).parents[3] / 'params'
+PERIOD = 1e-3
+MACHINE = machine_constants(MachineParameters())
+SHAPED = {
+    'jacobian_lead_lag': 'equilibrium',
+    'feedback_lead_lag': 'exact',
+    'feedback_soi': 'exact',
+}
+
+
+def parameters(file: str, **overrides: object) -> ControllerParameters:
+    """The parameters of ``params/laws``, and more."""
+    found = read_yaml(PARAMS / 'laws' / f'{file}.yaml', 'controller')
+    found.update({name.replace('__', '.'): value for name, value in overrides.items()})
+    return build(ControllerParameters, found)
+
+
+def design(file: str, axis: str, **overrides: object) -> AxisDesign:
+    """One axis of a law."""
+    chosen = parameters(file, **overrides)
+    return control_law(chosen).design(chosen, axis)
+
+
+def loop(found: AxisDesign, stiff: float, delay: int = 0) -> control.StateSpace:
+    """The open loop from e to -e by python-control, plant ``1 / (s² - α)`` held."""
+    n = found.drive.size
+    compensator = control.ss(
+        found.transition,
+        found.drive[:, None],
+        -found.total_gain[None, 2:],
+        [[-found.total_gain[0]]],
+        PERIOD,
+    )
+    assert compensator.nstates == n
+    continuous = control.ss([[0.0, 1.0], [stiff, 0.0]], [[0.0], [1.0]], [[1.0, 0.0]], [[0.0]])
+    plant = control.sample_system(continuous, PERIOD, method='zoh')
+    late = control.ss(control.tf([1.0], [1.0, *([0.0] * delay)], PERIOD)) if delay else 1.0
+    return plant * late * compensator
+
+
+def test_every_law_has_a_name_a_file_and_a_regulator() -> None:
+    """Registry, parameter choices and params/laws agree, and all files build."""
+    assert tuple(CONTROL_LAWS) == LAWS
+    files = {path.stem for path in (PARAMS / 'laws').glob('*.yaml')}
+    assert files == set(LAWS) - {'output_regulator'}
+    for name in files:
+        chosen = parameters(name)
+        assert chosen.law == name
+        assert len(Regulator(chosen).designs) == 5
+        build(PlantParameters, read_yaml(PARAMS / 'laws' / f'{name}.yaml', 'plant'))
+
+
+@pytest.mark.parametrize('law', SHAPED)
+@pytest.mark.parametrize('axis', ['y', 'x', 'phi', 'theta'])
+@pytest.mark.parametrize(('crossover', 'margin', 'delay'), [(300.0, 45.0, 0), (150.0, 50.0, 1)])
+def test_loops_have_the_wanted_bandwidth_and_margin(
+    law: str, axis: str, crossover: float, margin: float, delay: int
+) -> None:
+    """python-control finds crossover, phase margin and a stable closed loop."""
+    found = design(
+        law,
+        axis,
+        compensator__crossover=(crossover,) * 5,
+        compensator__phase_margin=margin,
+        input_delay=delay,
+    )
+    open_loop = loop(found, found.stiffness, delay)
+    at = complex(open_loop(np.exp(1j * crossover * PERIOD)))
+    assert abs(at) == pytest.approx(1.0, rel=1e-6)
+    assert math.degrees(np.angle(-at)) == pytest.approx(margin, abs=1e-4)
+    poles = np.abs(control.feedback(open_loop, 1).poles())
+    assert poles.max() < 1.0
+    margins = loop_margins(found, PERIOD, delay=delay, designed=delay)
+    assert margins.spectral_radius == pytest.approx(poles.max(), abs=1e-6)
+    assert margins.phase == pytest.approx(margin, abs=0.5)
+    above = np.exp(1j * PERIOD * np.linspace(1.05 * crossover, 0.99 * math.pi / PERIOD, 50))
+    assert np.all(np.abs(open_loop(above)) < 1.0)
+
+
+def test_the_shapes_are_what_they_are_called() -> None:
+    """Zeros and poles of the sampled compensators, by Tustin's rule, and the integrator's pole."""
+    for law, poles in (('feedback_lead_lag', 2), ('feedback_soi', 3)):
+        found = design(law, 'x', compensator__roll_off=6.0)
+        values = np.linalg.eigvals(found.transition)
+        assert values.size == poles
+        assert np.min(np.abs(values - 1.0)) < 1e-12
+        compensator = control.ss(
+            found.transition,
+            found.drive[:, None],
+            -found.total_gain[None, 2:],
+            [[-found.total_gain[0]]],
+            PERIOD,
+        )
+        zeros = control.ss2tf(compensator).zeros()
+        slow = zeros[np.argmin(np.abs(zeros - 1.0))].real
+        corner = 2.0 / PERIOD * (1.0 - slow) / (1.0 + slow)
+        assert corner == pytest.approx(30.0, rel=1e-6)
+        others = values[np.abs(values - 1.0) > 1e-9]
+        continuous = 2.0 / PERIOD * (others - 1.0) / (others + 1.0)
+        assert np.all(continuous.real < 0.0)
+        if law == 'feedback_soi':
+            np.testing.assert_allclose(np.abs(continuous), 6.0 * 300.0, rtol=1e-6)
+            np.testing.assert_allclose(np.cos(np.angle(-continuous)), math.sqrt(0.5), rtol=1e-6)
+
+
+def accelerate(state: np.ndarray, direct: np.ndarray, quadrature: np.ndarray) -> np.ndarray:
+    """(6), (7)."""
+    out = np.empty(5)
+    accelerations(MACHINE, state, direct, quadrature, out)
+    return out
+
+
+@pytest.mark.parametrize('gap', [0.0195, 0.025, 0.0295])
+def test_linearisation_is_that_of_the_full_model(gap: float) -> None:
+    """Equilibrium, stiffness and gains against differences of (6), (7)."""
+    state = np.zeros(10)
+    state[0] = gap
+    i_d = np.full(4, equilibrium_current(MACHINE, gap))
+    none = np.zeros(4)
+    np.testing.assert_allclose(accelerate(state, i_d, none), 0.0, atol=1e-9)
+    found = stiffness(MACHINE, gap)
+    for axis in range(5):
+        for sign in (1.0, -1.0):
+            moved = state.copy()
+            moved[2 * axis] += sign * 1e-6
+            got = accelerate(moved, i_d, none)[axis] / (sign * 1e-6)
+            assert got == pytest.approx(found[axis], rel=2e-3, abs=1e-6)
+    assert found[0] > 0.0
+    limits = Limits(7.0, 0.0, 0.0)
+    for axis in range(5):
+        wanted = np.zeros(5)
+        wanted[axis] = 1e-4
+        direct, quadrature, realised, excess = (np.zeros(n) for n in (4, 4, 5, 2))
+        saturated = equilibrium_inverse(
+            MACHINE, limits, np.ones(5), gap, wanted, direct, quadrature, realised, excess
+        )
+        assert not saturated
+        np.testing.assert_allclose(realised, wanted, atol=1e-13)
+        np.testing.assert_allclose(accelerate(state, direct, quadrature), wanted, atol=2e-8)
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.lists(st.floats(-300.0, 300.0), min_size=5, max_size=5))
+def test_what_the_linear_inverse_says_it_realises(wanted: list[float]) -> None:
+    """Within limits always, and with the currents it returns its own linear model agrees."""
+    direct, quadrature, realised, excess = (np.zeros(n) for n in (4, 4, 5, 2))
+    saturated = equilibrium_inverse(
+        MACHINE,
+        Limits(7.0, 0.0, 0.0),
+        np.ones(5),
+        0.025,
+        np.array(wanted),
+        direct,
+        quadrature,
+        realised,
+        excess,
+    )
+    assert np.abs(direct).max() <= 7.0
+    assert np.abs(quadrature).max() <= 7.0
+    if saturated:
+        assert np.abs(np.concatenate((direct, quadrature))).max() == pytest.approx(7.0)
+    else:
+        np.testing.assert_allclose(realised, wanted, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ('law', 'overrides', 'reason'),
+    [
+        ('jacobian_lead_lag', {'inverse': 'exact'}, "'inverse' is 'exact'.*it takes 'equilibrium'"),
+        ('feedback_soi', {'inverse': 'equilibrium'}, "double integrators.*takes 'exact' or"),
+        ('regulator_3dof', {'inverse': 'equilibrium'}, 'double integrators'),
+        ('feedback_lead_lag', {'law': 'output_regulator', 'inverse': 'equilibrium'}, 'double int'),
+        ('feedback_lead_lag', {'internal_model__antiwindup': 'paper'}, r'equation \(17\)'),
+        ('feedback_lead_lag', {'internal_model__restart_at_step': True}, 'must not be lost'),
+        ('feedback_soi', {'rate_estimate': 'observer'}, 'feeds back no rate'),
+        ('regulator_3dof', {'theta__controlled': True}, "'theta.controlled' is true.*false"),
+        ('jacobian_lead_lag', {'compensator__equilibrium': 0.032}, 'between the stops'),
+        ('feedback_lead_lag', {'compensator__crossover': (900.0,) * 5}, 'y: a crossover of 900'),
+        ('feedback_soi', {'compensator__phase_margin': 80.0}, 'y: .*at most a phase margin of'),
+        ('feedback_soi', {'law': 'feedback_sio'}, "'feedback_sio'.*must be one of output_regulator"),
+        ('feedback_soi', {'machine__motors': 1}, "'z.controlled' is true.*y and x only"),
+        ('feedback_soi', {'machine__motors': 3}, 'it must be 1 or 4'),
+    ],
+)
+def test_contradictions_are_refused(law: str, overrides: dict[str, object], reason: str) -> None:
+    """With the parameter and the reason, before anything moves."""
+    with pytest.raises(ParameterError, match=reason):
+        Regulator(parameters(law, **overrides))
+
+
+def test_a_single_motor_has_the_exact_inverse_only() -> None:
+    """The others do not hold for it."""
+    found = read_yaml(PARAMS / 'single_motor.yaml', 'controller')
+    assert Regulator(build(ControllerParameters, found)).parameters.machine.motors == 1
+    with pytest.raises(ParameterError, match=r"'simplified'.*single motor has 'exact' only"):
+        Regulator(build(ControllerParameters, found | {'inverse': 'simplified'}))
+
+
+def test_the_bandwidth_is_that_of_the_default_regulator() -> None:
+    """So that what is compared is the approach."""
+    ours = Regulator(ControllerParameters()).margins
+    wanted = ControllerParameters().compensator.crossover
+    for found, crossover in zip(ours, wanted, strict=True):
+        assert found.crossover == pytest.approx(crossover, rel=0.1)
+
+
+def test_axis_names_are_those_of_the_machine() -> None:
+    """The bandwidth is per axis, in output order."""
+    crossover = (100.0, 110.0, 120.0, 130.0, 140.0)
+    chosen = parameters('feedback_lead_lag', compensator__crossover=crossover)
+    for axis, wanted in zip(AXES, crossover, strict=True):
+        open_loop = loop(control_law(chosen).design(chosen, axis), 0.0)
+        assert abs(complex(open_loop(np.exp(1j * wanted * PERIOD)))) == pytest.approx(1.0, rel=1e-6)

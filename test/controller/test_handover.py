@@ -1,0 +1,132 @@
+"""Other gains in flight: w does not jump, the flight goes on, what cannot change is refused."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from maglev_controller import sample_step as law
+from maglev_controller.parameters import ControllerParameters
+from maglev_controller.regulator import Regulator
+from maglev_model.parameters import ParameterError, build, read_yaml, replace
+from maglev_plant.parameters import PlantParameters
+from maglev_plant.simulation import SimulatedStage
+from maglev_study.closed_loop import References, run
+
+PARAMS = Path(__file__).parents[2] / 'params'
+PERIOD, OMEGA = 1e-3, 1.5 * math.pi
+HOVER = np.array([0.025, 0.0, 0.0, 0.0, 0.0])
+
+
+def ellipse(first: int, samples: int) -> References:
+    """The 4DOF ellipse from sample ``first`` on."""
+    amplitude = np.array([0.005, 0.03, 0.03, 0.0, 0.010])
+    angle = OMEGA * PERIOD * (first + np.arange(samples))[:, None]
+    angle = angle + np.array([-math.pi / 2, -math.pi / 2, 0.0, 0.0, 0.0])
+    return References(
+        HOVER + amplitude * np.sin(angle),
+        amplitude * OMEGA * np.cos(angle),
+        -amplitude * OMEGA**2 * np.sin(angle),
+    )
+
+
+def stage(plant: str, references: References) -> SimulatedStage:
+    """A stage at the start of a reference."""
+    found = read_yaml(PARAMS / plant, 'plant')
+    found['initial.position'] = tuple(references.position[0])
+    found['initial.velocity'] = tuple(references.velocity[0])
+    return SimulatedStage(build(PlantParameters, found))
+
+
+CHANGES: dict[str, dict[str, object]] = {
+    'nothing': {},
+    'slower': {f'{a}.weight_error': 4e8 for a in ('y', 'x', 'z', 'phi', 'theta')},
+    'fewer frequencies': {f'{a}.multiples': (0.0, 1.0, 2.0) for a in ('y', 'x', 'theta')},
+    'more frequencies': {f'{a}.multiples': tuple(map(float, range(8))) for a in ('y', 'z')},
+    'no feed-forward': {'feed_forward': False},
+    'derivative filter': {'rate_estimate': 'derivative'},
+    'observer slower': {'observer.bandwidth': 600.0},
+}
+
+
+@pytest.mark.parametrize('name', CHANGES)
+def test_w_does_not_jump_and_the_flight_goes_on(name: str) -> None:
+    """Beside the flight that goes on unchanged; without counts, and with them on the benchmark."""
+    before, after = ellipse(0, 6000), ellipse(6000, 6000)
+    for plant, bound, error in (('ideal.yaml', 0.02, 4e-5), ('benchmark.yaml', 1.0, 6e-5)):
+        old, flying = Regulator(ControllerParameters()), stage(plant, before)
+        run(old, flying, before)
+        new = old.retuned(replace(old.parameters, CHANGES[name]))
+        sample = flying.read()
+        wanted = []
+        reference, currents = [array[0] for array in after], np.zeros((2, 4))
+        for regulator in (old, new):
+            regulator.step(*sample, *reference, *currents)
+            wanted.append(regulator.virtual_input.copy())
+        flying.write(*currents)
+        flying.read()
+        difference = np.abs(wanted[0] - wanted[1]).max()
+        assert difference < (1e-9 if name == 'nothing' else bound)
+        rest = References(*(array[1:] for array in after))
+        outcome = run(new, flying, rest)
+        off = np.abs(outcome.output - rest.position)
+        assert off.max() < (2e-3 if name == 'no feed-forward' else error)
+
+
+def test_the_share_that_fades_is_gone_soon() -> None:
+    """A tenth of a per cent is left after 0.35 s."""
+    before, after = ellipse(0, 3000), ellipse(3000, 400)
+    old, flying = Regulator(ControllerParameters()), stage('ideal.yaml', before)
+    run(old, flying, before)
+    new = old.retuned(replace(old.parameters, {'feed_forward': False}))
+    first = np.abs(new.arrays.state[:, law.BUMP]).max()
+    run(new, flying, after)
+    assert first > 0.1
+    assert np.abs(new.arrays.state[:, law.BUMP]).max() < 1e-3 * first
+
+
+def test_back_to_the_derivative_filter_and_forth() -> None:
+    """Either estimator takes the rate over from the other."""
+    before = ellipse(0, 3000)
+    regulator, flying = Regulator(ControllerParameters()), stage('ideal.yaml', before)
+    run(regulator, flying, before)
+    for part, choice in enumerate(('derivative', 'observer', 'derivative'), start=3):
+        regulator = regulator.retuned(replace(regulator.parameters, {'rate_estimate': choice}))
+        piece = ellipse(1000 * part, 1000)
+        outcome = run(regulator, flying, piece)
+        assert np.abs(outcome.output - piece.position).max() < 4e-5
+
+
+def test_on_the_ground_there_is_nothing_to_take_over() -> None:
+    """Before the first sample a retuned regulator is a new one."""
+    old = Regulator(ControllerParameters())
+    new = old.retuned(replace(old.parameters, {'y.weight_error': 1e9}))
+    fresh = Regulator(new.parameters)
+    np.testing.assert_array_equal(new.arrays.state, fresh.arrays.state)
+
+
+@pytest.mark.parametrize(
+    ('change', 'reason'),
+    [
+        ({'machine.mass_y': 7.5}, "'machine.mass_y' cannot change in flight .it is 6.9, not 7.5"),
+        ({'inverse': 'simplified'}, "'inverse' cannot change in flight"),
+        ({'phi.controlled': False}, "'phi.controlled' cannot change in flight"),
+        ({'input_delay': 1}, "'input_delay' cannot change in flight"),
+        ({'y.multiples': (0.0, 1.0, 1.0)}, 'y: .* given twice'),
+        ({'rate_estimate': 'derivative', 'x.weight_error': 1e13}, 'x: .* unstable'),
+    ],
+)
+def test_what_cannot_be_is_refused_and_changes_nothing(
+    change: dict[str, object], reason: str
+) -> None:
+    """The regulator in flight is as before, bit by bit."""
+    before = ellipse(0, 200)
+    old, flying = Regulator(ControllerParameters()), stage('ideal.yaml', before)
+    run(old, flying, before)
+    state = old.arrays.state.copy()
+    with pytest.raises(ParameterError, match=reason):
+        old.retuned(replace(old.parameters, change))
+    np.testing.assert_array_equal(old.arrays.state, state)

@@ -1,0 +1,96 @@
+"""The landing the controller makes by itself."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from maglev_controller.landing import Landing, reference_fault
+from maglev_controller.parameters import ControllerParameters
+from maglev_model.quintic import quintic_to_zero, transition_time
+
+PARAMETERS = ControllerParameters()
+LOWER = np.array(PARAMETERS.machine.lower_limit)
+UPPER = np.array(PARAMETERS.machine.upper_limit)
+
+
+def way(position: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
+    """The landing's samples (n, 3, 5), the last reference in front."""
+    landing = Landing(PARAMETERS, position, velocity, acceleration)
+    rows = [(position, velocity, acceleration)]
+    while not landing.done:
+        rows.append(landing.step())
+        assert len(rows) < 10_000
+    return np.array(rows)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    share=st.lists(st.floats(0.1, 0.9), min_size=5, max_size=5),
+    speed=st.lists(st.floats(-1.0, 1.0), min_size=5, max_size=5),
+    bend=st.lists(st.floats(-1.0, 1.0), min_size=5, max_size=5),
+)
+def test_from_any_reference_smoothly_to_the_stop(
+    share: list[float], speed: list[float], bend: list[float]
+) -> None:
+    """Continuous in position and velocity, within the stops, tilts level, at rest at 31 mm."""
+    position = LOWER + np.array(share) * (UPPER - LOWER)
+    velocity = np.array(speed) * [0.02, 0.1, 0.1, 0.004, 0.03]
+    rows = way(position, velocity, np.array(bend) * [0.1, 0.6, 0.6, 0.01, 0.2])
+    path, rate = rows[:, 0], rows[:, 1]
+    steps = np.diff(path, axis=0) - 0.5e-3 * (rate[1:] + rate[:-1])
+    assert np.abs(steps).max() < 1e-6
+    assert np.all(path >= LOWER - 1e-9)
+    assert np.all(path <= UPPER + 1e-9)
+    np.testing.assert_allclose(path[-1, [0, 3, 4]], [0.031, 0.0, 0.0], atol=1e-12)
+    assert not rows[-1, 1:].any()
+    down = path[400:, 0]
+    assert np.all(np.diff(down) >= -1e-15)
+
+
+def test_durations_are_the_parameters() -> None:
+    """Braking, descent and settling, in samples."""
+    rows = way(np.array([0.025, 0, 0, 0, 0.0]), np.zeros(5), np.zeros(5))
+    assert len(rows) - 1 == pytest.approx(2400, abs=1)
+    assert np.abs(rows[:, 1, 0]).max() == pytest.approx(1.875 * 0.006 / 1.5, rel=1e-3)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    start=st.tuples(st.floats(-0.05, 0.05), st.floats(-0.2, 0.2), st.floats(-2, 2)),
+    duration=st.floats(0.05, 3.0),
+)
+def test_quintic_meets_both_ends(start: tuple[float, float, float], duration: float) -> None:
+    """Start values as given, rest in zero at the end, derivatives those of the position."""
+    np.testing.assert_allclose(quintic_to_zero(*start, duration, 0.0), start, atol=1e-12)
+    almost = quintic_to_zero(*start, duration, duration * (1.0 - 1e-9))
+    np.testing.assert_allclose(almost, 0.0, atol=1e-5)
+    assert quintic_to_zero(*start, duration, duration) == (0.0, 0.0, 0.0)
+    time, step = 0.37 * duration, 1e-5 * duration
+    before, here, after = (
+        quintic_to_zero(*start, duration, t) for t in (time - step, time, time + step)
+    )
+    scale = 1e-4 * (abs(start[0]) / duration + abs(start[1]) + abs(start[2]) * duration + 1e-9)
+    assert (after[0] - before[0]) / (2 * step) == pytest.approx(here[1], abs=scale)
+    assert (after[1] - before[1]) / (2 * step) == pytest.approx(here[2], abs=scale / duration)
+
+
+def test_transition_time_keeps_the_acceleration() -> None:
+    """The peak acceleration of the profile it gives is the one allowed."""
+    duration = transition_time(0.06, 4.0, 0.2)
+    peak = max(
+        abs(quintic_to_zero(0.06, 0.0, 0.0, duration, t)[2])
+        for t in np.linspace(0.0, duration, 2001)
+    )
+    assert peak == pytest.approx(4.0, rel=1e-4)
+    assert transition_time(0.001, 4.0, 0.2) == 0.2
+
+
+def test_a_reference_out_of_reach_is_named() -> None:
+    """Beyond the stops by more than the margin."""
+    assert reference_fault(PARAMETERS, np.array([0.031, 0.05, -0.05, 0.003, -0.014])) == ''
+    assert 'x is 0.06' in reference_fault(PARAMETERS, np.array([0.025, 0.06, 0, 0, 0]))
+    assert 'y is 25' in reference_fault(PARAMETERS, np.array([25.0, 0, 0, 0, 0]))
+    assert 'theta is nan' in reference_fault(PARAMETERS, np.array([0.025, 0, 0, 0, np.nan]))

@@ -1,0 +1,160 @@
+"""Commissioning finds a single wrong sign or exchanged pair, and says what to change."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from bridge_flight import HOME
+
+from maglev_hw_bridge.commission import Commissioning, WrongError, run
+from maglev_hw_bridge.diagnosis import _explanations, diagnose
+from maglev_hw_bridge.drivers.emulated import EmulatedBoards
+from maglev_hw_bridge.drivers.quanser import QuanserDriver
+from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.response import Twins
+from maglev_model.parameters import build
+
+DEFAULT = BridgeParameters()
+PEAK = 1.5
+OTHER_MACHINE = {
+    'emulation.guide.coulomb': [0.4, 0.22, 0.12, 1.6, 1.1],
+    'emulation.offset.K_h': 0.95,
+    'emulation.wiring.encoder_start': [100, -5000, 7, 2**31 - 5, 0, 3],
+}
+PARAMS = Path(__file__).parents[2] / 'params' / 'hw_bridge.yaml'
+
+
+def flipped(values: Sequence[int], index: int) -> list[int]:
+    return [-value if i == index else value for i, value in enumerate(values)]
+
+
+def exchanged(values: Sequence[int], one: int, two: int) -> list[int]:
+    result = list(values)
+    result[one], result[two] = result[two], result[one]
+    return result
+
+
+def commission(claimed: dict[str, object]) -> tuple[list[str], EmulatedBoards]:
+    """Commission a machine that is wired as by default, with what the parameters claim."""
+    parameters = build(BridgeParameters, {**HOME, **claimed})
+    boards = EmulatedBoards(build(BridgeParameters, {**HOME, **claimed, **OTHER_MACHINE}))
+    told: list[str] = []
+    driver = QuanserDriver(parameters, boards, boards.now)
+    steps = Commissioning(parameters, driver, peak=PEAK, ask=told.append, tell=told.append)
+    try:
+        steps.run()
+    finally:
+        assert not np.any(boards.volts)
+        assert not boards.cards
+    return told, boards
+
+
+def test_a_machine_that_is_right() -> None:
+    told, boards = commission({})
+    assert 'as the parameters say' in ''.join(told)
+    assert 'rose 0.49' in told[-1] or 'rose 0.50' in told[-1]
+    assert boards.rig.state[0] == 0.031
+    assert boards.rig.impact < 0.05
+
+
+@pytest.mark.parametrize('phase', [0, 8])
+def test_a_phase_turned_round(phase: int) -> None:
+    sign = flipped(DEFAULT.amplifier.sign, phase)
+    with pytest.raises(WrongError, match=rf'sign of element {phase} of amplifier\.sign'):
+        commission({'amplifier.sign': sign})
+
+
+@pytest.mark.parametrize('encoder', [1, 4])
+def test_an_encoder_that_counts_the_other_way(encoder: int) -> None:
+    direction = flipped(DEFAULT.encoder.direction, encoder)
+    with pytest.raises(WrongError, match=rf'sign of element {encoder} of encoder\.direction'):
+        commission({'encoder.direction': direction})
+
+
+@pytest.mark.parametrize('pair', [(1, 2), (1, 8), (4, 10)])
+def test_exchanged_phases(pair: tuple[int, int]) -> None:
+    amplifier = DEFAULT.amplifier
+    claimed = {
+        'amplifier.board': exchanged(amplifier.board, *pair),
+        'amplifier.channel': exchanged(amplifier.channel, *pair),
+    }
+    with pytest.raises(WrongError, match='elements {} and {} of amplifier'.format(*pair)):
+        commission(claimed)
+
+
+@pytest.mark.parametrize('pair', [(1, 4)])
+def test_exchanged_encoders(pair: tuple[int, int]) -> None:
+    claimed = {'encoder.channel': exchanged(DEFAULT.encoder.channel, *pair)}
+    with pytest.raises(WrongError, match='elements {} and {} of encoder'.format(*pair)):
+        commission(claimed)
+
+
+def test_a_dead_phase_and_a_dead_encoder() -> None:
+    inject = {'emulation.inject.sample': 0, 'emulation.inject.dead_phase': 5}
+    with pytest.raises(WrongError, match='motor 2 phase c moves nothing'):
+        commission(inject)
+    inject = {'emulation.inject.sample': 0, 'emulation.inject.stuck_encoder': 3}
+    with pytest.raises(WrongError, match='encoder gap 4 sees nothing'):
+        commission(inject)
+
+
+@pytest.fixture(scope='module')
+def foretold() -> np.ndarray:
+    twins = Twins(build(BridgeParameters, HOME), PEAK)
+    return np.stack([twins.phase(phase, np.zeros(2)) for phase in range(12)], axis=1)
+
+
+def test_every_single_error_is_told_from_every_other(foretold: np.ndarray) -> None:
+    explanations = list(_explanations(foretold))
+    assert len(explanations) == 1 + 12 + 6 + 66 + 15
+    noise = np.random.default_rng(1).uniform(0.85, 1.15, foretold.shape[1:])
+    for text, shown in explanations:
+        finding = diagnose(shown[0] * noise, foretold)
+        assert finding.fine == (text == '')
+        assert finding.text == text or not text
+
+
+def test_two_errors_at_once_are_no_single_one(foretold: np.ndarray) -> None:
+    seen = foretold[0].copy()
+    for phase in (0, 4, 8, 11):
+        seen[phase] = seen[phase, ::-1]
+    seen[:, :, 4] *= -1.0
+    assert not diagnose(seen, foretold).fine
+
+
+def test_pulses_are_small(foretold: np.ndarray) -> None:
+    assert np.max(np.abs(foretold[..., :4])) < 5e-4
+    assert np.max(np.abs(foretold[..., 4:])) < 5e-3
+
+
+def test_the_executable(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    wrong = tmp_path / 'wrong.yaml'
+    content = {'hw_bridge': {'ros__parameters': {'encoder': {'direction': [1, 1, 1, 1, 1, -1]}}}}
+    wrong.write_text(yaml.safe_dump(content))
+    assert run(['--params', str(PARAMS), '--yes']) == 0
+    assert 'all is well' in capsys.readouterr().out
+    assert run(['--params', str(PARAMS), '--params', str(wrong), '--yes']) == 1
+    assert 'element 5 of encoder.direction' in capsys.readouterr().err
+    assert run(['--params', str(tmp_path / 'none.yaml')]) == 1
+    assert 'cannot read' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('answers', [[], ['y', 'no']])
+def test_it_asks_and_takes_no_for_an_answer(
+    answers: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    left = iter(answers)
+
+    def answer(_prompt: str) -> str:
+        try:
+            return next(left)
+        except StopIteration as error:
+            raise EOFError from error
+
+    monkeypatch.setattr('builtins.input', answer)
+    assert run(['--params', str(PARAMS)]) == 130
+    assert 'stopped' in capsys.readouterr().err

@@ -1,0 +1,107 @@
+"""Counts to lengths, roll-over, homing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from maglev_hw_bridge.encoders import Encoders, HomingError
+from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_model.parameters import ParameterError, build
+
+RESOLUTION = (1e-5, 2e-5, 5e-6, 1e-5, 1e-5, 2e-6)
+DIRECTION = (1, -1, 1, -1, -1, 1)
+
+
+def encoders(**overrides: object) -> Encoders:
+    names = {f'encoder.{name}': value for name, value in overrides.items()}
+    return Encoders(build(BridgeParameters, names))
+
+
+def as_counts(total: list[int]) -> np.ndarray:
+    return np.array([(value + 2**31) % 2**32 - 2**31 for value in total], dtype=np.int32)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    start=st.lists(st.integers(-(2**31), 2**31 - 1), min_size=6, max_size=6),
+    steps=st.lists(
+        st.lists(st.integers(-(2**31), 2**31 - 1), min_size=6, max_size=6), min_size=1, max_size=8
+    ),
+)
+def test_lengths_follow_any_motion_through_roll_over(
+    start: list[int], steps: list[list[int]]
+) -> None:
+    unit = encoders(resolution=RESOLUTION, direction=DIRECTION)
+    unit.start(as_counts(start))
+    total = list(start)
+    for step in steps:
+        total = [a + b for a, b in zip(total, step, strict=True)]
+        length = unit.decode(as_counts(total))
+        expected = [d * r * t for d, r, t in zip(DIRECTION, RESOLUTION, total, strict=True)]
+        assert length == pytest.approx(expected, rel=1e-14, abs=1e-15)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(st.integers(-(2**31), 2**31 - 1), min_size=6, max_size=6))
+def test_homing_puts_the_platen_home(counts: list[int]) -> None:
+    parameters = build(
+        BridgeParameters, {'encoder.direction': DIRECTION, 'homing.x': -0.05, 'homing.z': 0.05}
+    )
+    unit = Encoders(parameters)
+    unit.start(as_counts(counts))
+    unit.home(np.tile(as_counts(counts), (20, 1)))
+    assert unit.arrays.length == pytest.approx([0.031] * 4 + [-0.05, 0.05], abs=1e-12)
+    moved = as_counts([count + 100 for count in counts])
+    change = unit.decode(moved) - np.array([0.031] * 4 + [-0.05, 0.05])
+    assert change == pytest.approx(1e-3 * np.array(DIRECTION), abs=1e-9)
+
+
+def test_homing_wants_a_platen_at_rest() -> None:
+    unit = encoders()
+    unit.start(np.zeros(6, dtype=np.int32))
+    readings = np.zeros((20, 6), dtype=np.int32)
+    readings[7:, 4] = 4
+    with pytest.raises(HomingError, match='encoder x moves by 40 um'):
+        unit.home(readings)
+    assert not unit.homed
+
+
+def test_a_second_homing_elsewhere_is_refused() -> None:
+    unit = encoders()
+    rest = np.zeros((20, 6), dtype=np.int32)
+    unit.start(rest[0])
+    assert unit.home(rest) == pytest.approx([0.031] * 4 + [-0.05] * 2)
+    assert unit.home(rest + np.int32(20)) == pytest.approx([-2e-4] * 6)
+    lost = rest.copy()
+    lost[:, 2] = 120
+    with pytest.raises(HomingError, match='gap 3 reads'):
+        unit.home(lost)
+    assert unit.arrays.zero[2] == pytest.approx(0.031 - 2e-4)
+
+
+@pytest.mark.parametrize(
+    ('name', 'value', 'text'),
+    [
+        ('encoder.direction', (1, 1, 0, 1, 1, 1), 'must be 1 or -1'),
+        ('encoder.channel', (0, 1, 2, 2, 4, 5), 'elements 2 and 3'),
+        ('encoder.resolution', (1e-5,) * 5, 'takes 6'),
+        ('encoder.resolution', (10.0,) * 6, 'must lie in'),
+        ('encoder.channel', (0, 1, 2, 3, 4, 8), 'must lie in'),
+        ('amplifier.sign', (1,) * 11 + (0,), 'must be 1 or -1'),
+        ('amplifier.gain', (float('nan'),) * 12, 'finite'),
+        ('amplifier.continuous_current', 8.0, 'must not exceed'),
+        ('amplifier.warn_load', 0.9, 'must rise'),
+        ('boards.watchdog', 0.0015, 'must lie in'),
+        ('fault.stale', 0.001, 'two sample times'),
+        ('fault.lower', (0.04, -1.0, -1.0, -1.0, -1.0), 'less than'),
+        ('fault.command_limit', 1.0, 'at least'),
+        ('homing.wrong', 1.0, 'no parameter'),
+        ('emulation.encoder.gap_resolution', 5e-2, 'must lie in'),
+    ],
+)  # fmt: skip
+def test_wrong_parameters_are_refused(name: str, value: object, text: str) -> None:
+    with pytest.raises(ParameterError, match=text):
+        build(BridgeParameters, {name: value})

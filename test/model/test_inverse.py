@@ -1,0 +1,184 @@
+"""Both inverses against the plant's own equations, and their limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from maglev_model.inverse import Limits, exact_inverse, simplified_inverse
+from maglev_model.machine import MachineParameters, machine_constants
+from maglev_model.platen import accelerations, affine_terms
+
+MACHINE = machine_constants(MachineParameters())
+ALL = np.ones(5)
+WIDE = Limits(current=1000.0, levitation_first=0.0, least_attraction=0.0)
+PRIORITY = Limits(current=7.0, levitation_first=1.0, least_attraction=0.1)
+
+outputs = st.tuples(
+    st.floats(0.0185, 0.0305),
+    st.floats(-0.05, 0.05),
+    st.floats(-0.05, 0.05),
+    st.floats(-0.003, 0.003),
+    st.floats(-0.012, 0.012),
+).map(np.array)
+gentle = st.tuples(
+    st.floats(-6.0, 5.0),
+    st.floats(-2.0, 2.0),
+    st.floats(-2.0, 2.0),
+    st.floats(-4.0, 4.0),
+    st.floats(-4.0, 4.0),
+).map(np.array)
+rough = st.lists(st.floats(-2e3, 2e3), min_size=5, max_size=5).map(np.array)
+
+
+class Answer:
+    """What an inverse gives for one wanted acceleration."""
+
+    def __init__(
+        self,
+        inverse: Callable[..., bool],
+        limits: Limits,
+        output: np.ndarray,
+        wanted: np.ndarray,
+        controlled: np.ndarray = ALL,
+    ) -> None:
+        self.direct, self.quadrature = np.zeros(4), np.zeros(4)
+        self.realised, self.excess = np.zeros(5), np.zeros(2)
+        self.saturated = inverse(
+            MACHINE,
+            limits,
+            controlled,
+            output,
+            wanted,
+            self.direct,
+            self.quadrature,
+            self.realised,
+            self.excess,
+        )
+        state = np.zeros(10)
+        state[::2] = output
+        self.plant = np.zeros(5)
+        accelerations(MACHINE, state, self.direct, self.quadrature, self.plant)
+
+
+@settings(max_examples=150, deadline=None)
+@given(output=outputs, wanted=gentle)
+def test_exact_inverse_inverts_the_full_plant(output: np.ndarray, wanted: np.ndarray) -> None:
+    """(6), (7) with the currents of the exact inverse give the wanted accelerations."""
+    tilts = np.array([0.0, 0.0, 0.0, MACHINE.k_s_phi * output[3], MACHINE.k_s_theta * output[4]])
+    answer = Answer(exact_inverse, PRIORITY, output, wanted - tilts)
+    np.testing.assert_allclose(answer.plant, wanted - tilts, rtol=1e-9, atol=1e-9)
+    assert not answer.saturated
+    np.testing.assert_allclose(answer.quadrature[[0, 1]], answer.quadrature[[2, 3]])
+
+
+@settings(max_examples=100, deadline=None)
+@given(output=outputs, wanted=gentle)
+def test_simplified_inverse_solves_equation_11(output: np.ndarray, wanted: np.ndarray) -> None:
+    """The paper's nominal model, from its a_i, b_j, c_k, gives the wanted accelerations."""
+    answer = Answer(simplified_inverse, WIDE, output, wanted)
+    a, b, c = np.zeros(9), np.zeros(6), np.zeros(6)
+    u_x, u_z = answer.quadrature[1], answer.quadrature[0]
+    affine_terms(MACHINE, output[0], output[3], output[4], u_x, u_z, a, b, c)
+    v_phi, v_theta = answer.direct[0] - answer.direct[2], answer.direct[3] - answer.direct[1]
+    v_y = answer.direct[0] + answer.direct[2]
+    assert v_y == pytest.approx(answer.direct[1] + answer.direct[3], abs=1e-9)  # (8)
+    assert a[0] + a[2] * v_y + a[1] * v_phi + a[6] * v_theta == pytest.approx(wanted[0], abs=1e-8)
+    assert b[0] + b[2] * v_y + b[1] * v_phi == pytest.approx(wanted[3], abs=1e-8)
+    assert c[0] + c[2] * v_y + c[1] * v_theta == pytest.approx(wanted[4], abs=1e-8)
+    np.testing.assert_allclose(answer.plant[1:3], wanted[1:3], rtol=1e-9, atol=1e-12)
+
+
+def test_the_paper_leaves_a_fifth_of_the_vertical_force_out_at_20_mm() -> None:
+    """Off the balance the simplified inverse misses (6) by the quadratic terms of (9)."""
+    output, wanted = np.array([0.020, 0.0, 0.0, 0.0, 0.0]), np.zeros(5)
+    simplified = Answer(simplified_inverse, WIDE, output, wanted)
+    exact = Answer(exact_inverse, WIDE, output, wanted)
+    assert abs(exact.plant[0]) < 1e-12
+    v_y = 2.0 * simplified.direct[0]
+    a, b, c = np.zeros(9), np.zeros(6), np.zeros(6)
+    affine_terms(MACHINE, 0.020, 0.0, 0.0, 0.0, 0.0, a, b, c)
+    assert simplified.plant[0] == pytest.approx(a[5] * v_y**2, rel=1e-9)
+    assert 0.15 < -a[5] * v_y**2 / (a[2] * v_y) < 0.25
+
+
+@settings(max_examples=200, deadline=None)
+@given(output=outputs, wanted=rough)
+def test_limits_hold_whatever_is_wanted(output: np.ndarray, wanted: np.ndarray) -> None:
+    """Phase amplitude within 7 A, and what is said to be realised is what the plant then does."""
+    answer = Answer(exact_inverse, PRIORITY, output, wanted)
+    amplitude = np.hypot(answer.direct, answer.quadrature)
+    assert np.all(amplitude <= PRIORITY.current * (1.0 + 1e-9))
+    np.testing.assert_allclose(answer.plant, answer.realised, rtol=1e-9, atol=1e-9)
+    met = np.allclose(answer.plant, wanted, rtol=1e-6, atol=1e-6)
+    assert met or answer.saturated
+
+
+@settings(max_examples=100, deadline=None)
+@given(output=outputs, horizontal=st.tuples(st.floats(-300, 300), st.floats(-300, 300)))
+def test_levitation_comes_first(output: np.ndarray, horizontal: tuple[float, float]) -> None:
+    """However much u_x and u_z are asked for, y and the tilts get what they want."""
+    tilts = -np.array([MACHINE.k_s_phi * output[3], MACHINE.k_s_theta * output[4]])
+    wanted = np.array([0.5, *horizontal, *tilts])
+    answer = Answer(exact_inverse, PRIORITY, output, wanted)
+    np.testing.assert_allclose(answer.plant[[0, 3, 4]], wanted[[0, 3, 4]], rtol=1e-6, atol=1e-6)
+    for axis in (1, 2):  # in the wanted direction, never more than wanted
+        assert answer.plant[axis] * wanted[axis] >= 0.0
+        assert abs(answer.plant[axis]) <= abs(wanted[axis]) * (1.0 + 1e-9)
+
+
+def test_without_priority_a_large_quadrature_current_costs_levitation() -> None:
+    """Why there is one: i_q attracts, and at 7 A nothing is left to lower the attraction."""
+    output, wanted = np.array([0.025, 0.0, 0.0, 0.0, 0.0]), np.array([0.0, 100.0, 0.0, 0.0, 0.0])
+    plain = Answer(exact_inverse, PRIORITY._replace(levitation_first=0.0), output, wanted)
+    assert abs(plain.quadrature[1]) == 7.0
+    assert plain.plant[0] < -50.0
+    assert abs(Answer(exact_inverse, PRIORITY, output, wanted).plant[0]) < 1e-9
+
+
+def test_horizontal_acceleration_at_hover_is_enough_for_the_steps() -> None:
+    """At least 6 m/s² anywhere in 20-30 mm; an even split of the attraction would give 5."""
+    for gap in (0.020, 0.025, 0.030):
+        output = np.array([gap, 0.0, 0.0, 0.0, 0.0])
+        answer = Answer(exact_inverse, PRIORITY, output, np.array([0.0, 100.0, 0.0, 0.0, 0.0]))
+        assert answer.plant[1] > 6.0
+
+
+@pytest.mark.parametrize('inverse', [exact_inverse, simplified_inverse])
+def test_tilts_without_control_get_equal_direct_currents(inverse: Callable[..., bool]) -> None:
+    """v_φ = v_θ = 0, and the vertical axis still has what it wants with the exact inverse."""
+    controlled = np.array([1.0, 1.0, 1.0, 0.0, 0.0])
+    output = np.array([0.024, 0.0, 0.0, 0.001, -0.002])
+    wanted = np.array([1.0, 0.3, -0.2, 55.0, -70.0])
+    answer = Answer(inverse, WIDE, output, wanted, controlled)
+    assert answer.direct[0] == pytest.approx(answer.direct[2], abs=1e-12)
+    assert answer.direct[1] == pytest.approx(answer.direct[3], abs=1e-12)
+    if inverse is exact_inverse:
+        np.testing.assert_allclose(answer.plant[:3], wanted[:3], rtol=1e-9)
+
+
+@pytest.mark.parametrize('inverse', [exact_inverse, simplified_inverse])
+def test_horizontal_axes_without_control_get_no_current(inverse: Callable[..., bool]) -> None:
+    """And y without control gets no direct current."""
+    controlled = np.array([0.0, 0.0, 0.0, 1.0, 1.0])
+    output = np.array([0.025, 0.01, 0.0, 0.0, 0.0])
+    answer = Answer(inverse, WIDE, output, np.array([3.0, 2.0, 1.0, 0.0, 0.0]), controlled)
+    assert not answer.quadrature.any()
+    np.testing.assert_allclose(answer.direct, 0.0, atol=1e-12)
+
+
+def test_simplified_saturation_is_sat_7() -> None:
+    """u_x clipped at 7 A, the excess of (17) told, the other currents by themselves."""
+    limits = Limits(current=7.0, levitation_first=0.0, least_attraction=0.0)
+    output, wanted = np.array([0.025, 0.0, 0.0, 0.0, 0.0]), np.array([0.0, 90.0, 1.0, 0.0, 0.0])
+    answer = Answer(simplified_inverse, limits, output, wanted)
+    free = Answer(simplified_inverse, WIDE, output, wanted)
+    assert answer.quadrature[1] == -7.0
+    assert answer.excess[0] == pytest.approx(-7.0 - free.quadrature[1])
+    assert answer.excess[1] == 0.0
+    assert answer.saturated
+    assert not free.saturated

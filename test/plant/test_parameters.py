@@ -1,0 +1,99 @@
+"""The plant's parameters and its parameter files."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from maglev_model.machine import machine_constants
+from maglev_model.parameters import ParameterError, build, from_yaml, read_yaml, specs, values
+from maglev_plant.arrays import true_machine
+from maglev_plant.parameters import PlantParameters
+
+PARAMS = Path(__file__).resolve().parents[2] / 'params'
+
+
+def test_the_file_lists_every_parameter_with_its_default() -> None:
+    listed = read_yaml(PARAMS / 'plant.yaml', 'plant')
+    defaults = values(PlantParameters())
+    missing = set(defaults) - set(listed)
+    assert not missing
+    of_the_plant = {name: value for name, value in listed.items() if name in defaults}
+    assert build(PlantParameters, of_the_plant) == PlantParameters()
+
+
+def test_the_files_write_doubles_as_ros_wants_them() -> None:
+    table = specs(PlantParameters)
+    for path in ('plant.yaml', 'benchmark.yaml', 'ideal.yaml'):
+        listed = read_yaml(PARAMS / path, 'plant')
+        for name in set(listed) & set(table):
+            value = listed[name]
+            elements = value if isinstance(value, list) else [value]
+            assert {type(element) for element in elements} == {table[name].kind}, (path, name)
+
+
+def test_benchmark_is_the_default() -> None:
+    assert from_yaml(PlantParameters, 'plant', PARAMS / 'benchmark.yaml') == PlantParameters()
+
+
+def test_ideal_has_no_friction_counts_or_lag() -> None:
+    ideal = from_yaml(PlantParameters, 'plant', PARAMS / 'ideal.yaml')
+    assert ideal.guide.coulomb == ideal.guide.viscous == (0.0,) * 5
+    assert ideal.encoder.gap_resolution == ideal.encoder.horizontal_resolution == 0.0
+    assert ideal.amplifier.bandwidth == 0.0
+    changed = set(read_yaml(PARAMS / 'ideal.yaml', 'plant'))
+    assert all(name.startswith(('guide.', 'encoder.', 'amplifier.bandwidth')) for name in changed)
+
+
+@pytest.mark.parametrize(
+    ('name', 'value', 'match'),
+    [
+        ('encoder.gap_resolution', 10.0, 'encoder.gap_resolution'),
+        ('guide.coulomb', (0.3, 0.1), 'guide.coulomb'),
+        ('guide.coulomb', (0.3, 0.1, math.nan, 1.0, 1.0), 'guide.coulomb'),
+        ('gide.coulomb', (0.0,) * 5, "did you mean 'guide.coulomb'"),
+        ('sample_time', 1.0, 'sample_time'),
+        ('amplifier.continuous_current', 8.0, 'continuous_current.*peak_current'),
+        ('initial.position', (0.025, 0.06, 0.0, 0.0, 0.0), r'initial.position.* x '),
+        ('initial.position', (0.031, 0.0, 0.0, 0.0, 0.01), 'initial.position.*vertical stop'),
+        ('guide.coulomb_velocity', (1e-5,) * 5, 'substeps.*at least'),
+        ('amplifier.dq_scaling', 'peak', 'dq_scaling'),
+    ],
+)
+def test_refused(name: str, value: object, match: str) -> None:
+    with pytest.raises(ParameterError, match=match):
+        build(PlantParameters, {name: value})
+
+
+def test_the_substeps_asked_for_are_enough() -> None:
+    stiff = {'guide.coulomb_velocity': (1e-5,) * 5}
+    with pytest.raises(ParameterError) as refusal:
+        build(PlantParameters, stiff)
+    needed = int(str(refusal.value).rsplit(' ', 1)[1])
+    assert build(PlantParameters, {**stiff, 'substeps': needed}).substeps == needed
+
+
+def test_offsets_change_the_true_plant_only() -> None:
+    nominal = machine_constants(PlantParameters().machine)
+    assert true_machine(PlantParameters()) == nominal
+    names = [name for name in values(PlantParameters()) if name.startswith('offset.')]
+    plant = build(PlantParameters, dict.fromkeys(names, 1.1))
+    assert machine_constants(plant.machine) == nominal
+    true = true_machine(plant)
+    for field in (
+        'K_v1',
+        'K_v2',
+        'K_v3',
+        'K_h',
+        'M_x',
+        'M_y',
+        'M_z',
+        'I_x',
+        'k_s_phi',
+        'k_s_theta',
+    ):
+        assert getattr(true, field) == pytest.approx(1.1 * getattr(nominal, field)), field
+    for field in ('C_v1', 'C_v2', 'C_v3', 'C_x', 'C_z', 'k_rot', 'G', 'tau', 'r'):
+        assert getattr(true, field) == pytest.approx(getattr(nominal, field)), field

@@ -1,0 +1,170 @@
+"""``paper_tables FOLDER``: the paper's figures beside those of made-up runs."""
+
+from __future__ import annotations
+
+import copy
+import json
+import re
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from maglev_monitor.bag.analysis import analyse
+from maglev_study import paper_plots, paper_tables
+from maglev_study.paper import SCENARIOS, STEPS, TRACKING
+from maglev_study.paper_tables import CONTROLLERS, HEADS, NOT_PASSED, NOTHING, PASS
+
+MADE = [step for step in STEPS if (step.axis, step.target) in (('y', 0.027), ('theta', 0.01))]
+"""The steps that the made-up run has."""
+
+
+@pytest.fixture(scope='module')
+def result(bag: Path) -> dict[str, Any]:
+    return analyse(bag).result
+
+
+@pytest.fixture
+def folder(tmp_path: Path, bag: Path, result: dict[str, Any]) -> Path:
+    """Six runs, their bags all the same one, their figures told apart by a factor."""
+    factor = 1.0
+    for controller in CONTROLLERS:
+        for scenario in SCENARIOS:
+            run = tmp_path / controller / scenario
+            run.mkdir(parents=True)
+            (run / 'bag').symlink_to(bag)
+            own = copy.deepcopy(result)
+            own['axes']['x']['mean_abs_error'] *= factor
+            (run / 'metrics.json').write_text(json.dumps(own))
+            factor *= 1.5
+    return tmp_path
+
+
+@pytest.fixture
+def two_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ask for the two steps only that the made-up run has."""
+    monkeypatch.setattr(paper_tables, 'STEPS', MADE)
+    monkeypatch.setattr(paper_plots, 'STEPS', MADE)
+
+
+@pytest.fixture
+def no_plots(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(paper_plots, 'paper_plots', lambda _: [])
+
+
+def change(run: Path, **fields: Any) -> None:
+    """Change fields of a run's metrics."""
+    path = run / 'metrics.json'
+    path.write_text(json.dumps({**json.loads(path.read_text()), **fields}))
+
+
+@pytest.mark.usefixtures('two_steps')
+def test_page_is_self_contained_with_every_figure(folder: Path, capsys: Any) -> None:
+    assert paper_tables.paper_tables([str(folder)]) == PASS
+    page = (folder / 'paper_tables.html').read_text(encoding='utf-8')
+    assert not re.findall(r'(?:src|href)="(?!data:)', page)
+    assert 'http' not in re.sub(r'base64,[^"]*', '', page)
+    titles = re.findall(r'<h2>([^<]*)</h2>', page)
+    assert [title[:6] for title in titles] == [
+        'Fig. 4',
+        'Fig. 5',
+        'Fig. 6',
+        'Fig. 7',
+        'Fig. 8',
+        'Runs',
+    ]
+    assert page.count('data:image/png;base64,') == 5
+    assert 'class="badge pass"' in page
+    printed = capsys.readouterr()
+    assert printed.err == ''
+    assert (folder / 'paper_tables.md').read_text(encoding='utf-8') in printed.out
+    assert not list(folder.glob('*.tmp'))
+
+
+@pytest.mark.usefixtures('two_steps', 'no_plots')
+def test_each_run_fills_its_own_cells(folder: Path, result: dict[str, Any]) -> None:
+    assert paper_tables.paper_tables([str(folder), '--out', str(folder / 'page')]) == PASS
+    lines = (folder / 'page' / 'paper_tables.md').read_text(encoding='utf-8').splitlines()
+    cells = [[cell.strip() for cell in re.split(r'(?<!\\)\|', line)[1:-1]] for line in lines]
+    assert cells[0] == list(HEADS)
+    assert {len(row) for row in cells} == {4}
+    # Two head lines; for each ellipse a heading and five axes; a heading and the steps.
+    assert len(cells) == 2 + 6 * len(TRACKING) + 1 + len(MADE)
+    mean = 1e6 * result['axes']['x']['mean_abs_error']
+    x = [row for row in cells if row[0] == 'x']
+    assert x[0][1:] == ['78.33 µm', f'{1.5 * mean:.1f} µm', f'{1.5**4 * mean:.1f} µm']
+    assert x[1][1:] == ['77.98 µm', f'{1.5**2 * mean:.1f} µm', f'{1.5**5 * mean:.1f} µm']
+    theta = [row for row in cells if row[0] == 'theta']
+    assert [row[1] for row in theta] == ['–', '123.9 µrad']
+    y, theta = result['steps']
+    assert theta['encoder_time'] is None
+    for row, step in ((cells[-2], y), (cells[-1], theta)):
+        times = [
+            f'{step[key]:.2f} s' if step[key] else 'never'
+            for key in ('settling_time', 'encoder_time')
+        ]
+        assert row[2] == row[3] == f'{step["overshoot_percent"]:.1f} %, {times[0]}, {times[1]}'
+    assert cells[-2][:2] == ['y, 20 → 27 mm', '14.3 %, < 3 s, about 5 s']
+    assert cells[-1][:2] == ['theta, 0 → 10 mrad', '22 %, < 5 s, < 10 s']
+    assert f'60 s, simulated over {result["duration"]:g} s' in cells[2][0]
+
+
+@pytest.mark.usefixtures('no_plots')
+def test_what_is_wrong_with_a_run_is_said_and_fails(folder: Path, bag: Path, capsys: Any) -> None:
+    change(folder / 'paper' / 'ellipse', verdict='fail', reasons=['x mean is 9', 'more'])
+    (folder / 'paper' / 'ellipse_4dof' / 'metrics.json').write_text('{"verdict"')
+    (folder / 'ours' / 'ellipse' / 'bag').unlink()
+    cut = folder / 'ours' / 'ellipse_4dof' / 'bag'
+    cut.unlink()
+    cut.mkdir()
+    (cut / 'bag.mcap').write_bytes((bag / 'bag.mcap').read_bytes()[:-2000])
+    shutil.rmtree(folder / 'ours' / 'steps')
+    assert paper_tables.paper_tables([str(folder)]) == NOT_PASSED
+    problems = dict(
+        line.removeprefix('paper_tables: ').split(': ', 1)
+        for line in capsys.readouterr().err.splitlines()
+    )
+    law, ours = CONTROLLERS.values()
+    expected = {
+        f'{law}, steps': '5 of 7 steps are missing, first that of y to 25 mm',
+        f'{ours}, steps': 'it has not finished',
+        f'{law}, ellipse': 'fail: x mean is 9',
+        f'{ours}, ellipse': 'there is no bag',
+        f'{law}, ellipse_4dof': 'its metrics.json is damaged',
+        f'{ours}, ellipse_4dof': 'recovered',
+    }
+    assert problems.keys() == expected.keys()
+    for run, words in expected.items():
+        assert words in problems[run]
+    page = (folder / 'paper_tables.html').read_text(encoding='utf-8')
+    assert 'class="badge fail"' in page
+    assert '0 of 6 runs passed' in page
+
+
+def test_a_run_that_tracked_nothing_is_no_ellipse(folder: Path) -> None:
+    path = folder / 'ours' / 'ellipse' / 'metrics.json'
+    found = json.loads(path.read_text())
+    found['axes'] = {axis: dict.fromkeys(row, None) for axis, row in found['axes'].items()}
+    path.write_text(json.dumps(found))
+    run = paper_tables.load_run(folder, 'ours', 'ellipse')
+    assert run.problem == 'it tracked nothing'
+    assert all(row[-1] == '–' for row in list(paper_tables.rows([run]))[1:6])
+
+
+def test_no_run_at_all_is_one_line(tmp_path: Path, capsys: Any) -> None:
+    assert paper_tables.paper_tables([str(tmp_path / 'nothing')]) == NOTHING
+    captured = capsys.readouterr()
+    assert captured.out == ''
+    assert captured.err.count('\n') == 1
+    assert f"no finished run in '{tmp_path / 'nothing'}'" in captured.err
+
+
+@pytest.mark.usefixtures('no_plots')
+def test_a_page_that_cannot_be_written_is_one_line(folder: Path, capsys: Any) -> None:
+    (folder / 'file').write_text('')
+    assert paper_tables.paper_tables([str(folder), '--out', str(folder / 'file')]) == NOTHING
+    captured = capsys.readouterr()
+    assert captured.out == ''
+    assert captured.err.startswith(f"paper_tables: error: cannot write to '{folder / 'file'}'")
+    assert captured.err.count('\n') == 1
