@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from maglev_model.inverse import Limits, exact_inverse, simplified_inverse
+from maglev_model.inverse import CurrentLimits, exact_inverse, simplified_inverse
 from maglev_model.machine import MachineParameters, machine_constants
 from maglev_model.platen import accelerations, affine_terms
 
 MACHINE = machine_constants(MachineParameters())
 ALL = np.ones(5)
-WIDE = Limits(current=1000.0, levitation_first=0.0, least_attraction=0.0)
-PRIORITY = Limits(current=7.0, levitation_first=1.0, least_attraction=0.1)
+WIDE = CurrentLimits(current=1000.0, levitation_first=0.0, least_attraction=0.0)
+PRIORITY = CurrentLimits(current=7.0, levitation_first=1.0, least_attraction=0.1)
 
 outputs = st.tuples(
     st.floats(0.0185, 0.0305),
@@ -41,7 +41,7 @@ class Answer:
     def __init__(
         self,
         inverse: Callable[..., bool],
-        limits: Limits,
+        limits: CurrentLimits,
         output: np.ndarray,
         wanted: np.ndarray,
         controlled: np.ndarray = ALL,
@@ -173,7 +173,7 @@ def test_horizontal_axes_without_control_get_no_current(inverse: Callable[..., b
 
 def test_simplified_saturation_is_sat_7() -> None:
     """u_x clipped at 7 A, the excess of (17) told, the other currents by themselves."""
-    limits = Limits(current=7.0, levitation_first=0.0, least_attraction=0.0)
+    limits = CurrentLimits(current=7.0, levitation_first=0.0, least_attraction=0.0)
     output, wanted = np.array([0.025, 0.0, 0.0, 0.0, 0.0]), np.array([0.0, 90.0, 1.0, 0.0, 0.0])
     answer = Answer(simplified_inverse, limits, output, wanted)
     free = Answer(simplified_inverse, WIDE, output, wanted)

@@ -12,13 +12,12 @@ from hypothesis import strategies as st
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
-from maglev_model.inverse import Limits
+from maglev_model.inverse import CurrentLimits, exact_inverse
 from maglev_model.machine import MachineParameters, machine_constants
 from maglev_model.motor import horizontal_force, vertical_force
 from maglev_model.parameters import ParameterError, build, from_yaml, read_yaml
 from maglev_model.phases import Phase
 from maglev_model.platen import accelerations
-from maglev_model.single_motor import single_motor_inverse
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
 from maglev_reference.parameters import ReferenceParameters
@@ -34,13 +33,13 @@ gaps = st.floats(0.0185, 0.0305)
 
 
 def inverse(
-    gap: float, w_y: float, w_x: float, limits: Limits
+    gap: float, w_y: float, w_x: float, limits: CurrentLimits
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
     """Currents i_d, i_q, realised accelerations, and whether limited."""
     output, wanted = np.zeros(5), np.zeros(5)
     output[0], wanted[0], wanted[1] = gap, w_y, w_x
     direct, quadrature, realised, excess = (np.full(n, 9.0) for n in (4, 4, 5, 2))
-    limited = single_motor_inverse(
+    limited = exact_inverse(
         MACHINE, limits, BOTH, output, wanted, direct, quadrature, realised, excess
     )
     return direct, quadrature, realised, limited
@@ -66,7 +65,7 @@ def test_it_is_four_motors_that_carry_four_and_two_times_the_mass(
 @given(gaps, st.floats(-4.0, 4.0), st.floats(-3.0, 3.0))
 def test_the_inverse_inverts(gap: float, w_y: float, w_x: float) -> None:
     """By (1), (2) the currents give what was wanted, or what the inverse says they give."""
-    direct, quadrature, realised, limited = inverse(gap, w_y, w_x, Limits(7.0, 1.0, 0.1))
+    direct, quadrature, realised, limited = inverse(gap, w_y, w_x, CurrentLimits(7.0, 1.0, 0.1))
     assert not direct[[0, 2, 3]].any()
     assert not quadrature[[0, 2, 3]].any()
     i_d, i_q = direct[1], quadrature[1]
@@ -81,7 +80,7 @@ def test_the_inverse_inverts(gap: float, w_y: float, w_x: float) -> None:
 @given(gaps, st.floats(-200.0, 9.8), st.floats(-500.0, 500.0))
 def test_levitation_comes_before_travel(gap: float, w_y: float, w_x: float) -> None:
     """Within the amplitude; i_q never costs the attraction that the platen needs."""
-    limits = Limits(7.0, 1.0, 0.1)
+    limits = CurrentLimits(7.0, 1.0, 0.1)
     direct, quadrature, realised, _ = inverse(gap, w_y, w_x, limits)
     assert math.hypot(direct[1], quadrature[1]) <= 7.0 * (1.0 + 1e-9)
     alone = inverse(gap, w_y, 0.0, limits)[2]

@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 
 from maglev_model.compiled import compiled
 from maglev_model.equilibrium import equilibrium_inverse
-from maglev_model.inverse import Limits, exact_inverse, simplified_inverse
+from maglev_model.inverse import CurrentLimits, exact_inverse, simplified_inverse
 from maglev_model.machine import Machine, machine_from_array
 from maglev_model.platen import outputs_from_gaps
 from maglev_model.quintic import quintic_to_zero, transition_time
-from maglev_model.single_motor import single_motor_inverse
 
 FloatArray = NDArray[np.float64]
 
@@ -279,12 +278,10 @@ def _currents(
     excess: FloatArray,
 ) -> bool:
     """The inverse of the settings; see the module ``inverse`` for the arguments."""
-    limits = Limits(settings[CURRENT], settings[LEVITATION_FIRST], settings[LEAST_ATTRACTION])
+    limits = CurrentLimits(
+        settings[CURRENT], settings[LEVITATION_FIRST], settings[LEAST_ATTRACTION]
+    )
     controlled = settings[CONTROLLED : CONTROLLED + 5]
-    if machine.motors == 1.0:
-        return single_motor_inverse(
-            machine, limits, controlled, output, wanted, direct, quadrature, realised, excess
-        )
     if settings[INVERSE] == EXACT:
         return exact_inverse(
             machine, limits, controlled, output, wanted, direct, quadrature, realised, excess

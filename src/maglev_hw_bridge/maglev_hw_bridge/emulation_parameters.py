@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 
+from maglev_model.guide import GuideParameters
 from maglev_model.parameters import group, parameter
 from maglev_plant.parameters import (
     DisturbanceParameters,
     EncoderParameters,
-    GuideParameters,
     InitialParameters,
     OffsetParameters,
     StopParameters,

@@ -10,15 +10,11 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
-from maglev_model.inverse import Limits
+from maglev_model.inverse import CurrentLimits
 from maglev_model.machine import Machine
 from maglev_model.motor import attraction_coefficients
-
-FloatArray = NDArray[np.float64]
 
 
 @compiled
@@ -53,7 +49,7 @@ def _clip(value: float, limit: float) -> float:
 @compiled
 def equilibrium_inverse(
     machine: Machine,
-    limits: Limits,
+    limits: CurrentLimits,
     controlled: FloatArray,
     gap: float,
     wanted: FloatArray,

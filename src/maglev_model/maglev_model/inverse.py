@@ -19,26 +19,26 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
 from maglev_model.machine import Machine
 from maglev_model.motor import attraction_coefficients
 from maglev_model.platen import affine_terms, gaps_from_outputs
 
-FloatArray = NDArray[np.float64]
-
-
 RESERVE = 1.1
 """Attraction a motor gets at least, in b² i_q²: at 1 its i_d has no slope left to act with."""
 
 
-class Limits(NamedTuple):
+class CurrentLimits(NamedTuple):
     """What the currents must keep to."""
 
     current: float  # phase-current amplitude of a motor, sat_7 of (17) [A]
     levitation_first: float  # 1: i_q yields to the i_d that carries the platen; 0: each by itself
-    least_attraction: (
-        float  # share of the weight that stays carried, so that the tilts keep authority
-    )
+    least_attraction: float  # share of the weight always carried, so that the tilts keep authority
+
+
+NO_LIMITS = CurrentLimits(math.inf, 1.0, 0.0)
+"""Any current: only what no current at all can give is out of reach."""
 
 
 @compiled
@@ -49,7 +49,7 @@ def _clip(value: float, limit: float) -> float:
 @compiled
 def simplified_inverse(
     machine: Machine,
-    limits: Limits,
+    limits: CurrentLimits,
     controlled: FloatArray,
     output: FloatArray,
     wanted: FloatArray,
@@ -112,9 +112,55 @@ def _solve_simplified(
 
 
 @compiled
+def _single_motor_inverse(
+    machine: Machine,
+    limits: CurrentLimits,
+    controlled: FloatArray,
+    output: FloatArray,
+    wanted: FloatArray,
+    direct: FloatArray,
+    quadrature: FloatArray,
+    realised: FloatArray,
+    excess: FloatArray,
+) -> bool:
+    """Motor 2 through the quadratic (2). See the module for the arguments.
+
+    ``F_V = M_y (w_y - G)`` and ``F_H = M_x w_x`` with ``F_V = -P``, ``P = (a - b i_d)² + b² i_q²``.
+    When levitation comes first, i_q gets what the attraction leaves: ``b² i_q² ≤ P`` and i_d within
+    the amplitude. The other motors get no current.
+    """
+    a, b, h = attraction_coefficients(machine, output[0])
+    gain = -h / machine.M_x
+    u_x = controlled[1] * wanted[1] / gain
+    pull = machine.M_y * (machine.G - wanted[0]) if controlled[0] != 0.0 else a * a
+    attraction = max(pull, limits.least_attraction * machine.M_y * machine.G)
+    limit = limits.current
+    if limits.levitation_first != 0.0:
+        root = max((a * a + attraction - (limit * b) ** 2) / (2.0 * a), 0.0)
+        limit = min(limit, math.sqrt(max(attraction - root * root, 0.0)) / b)
+    i_q = min(max(u_x, -limit), limit)
+    square = attraction - (b * i_q) ** 2
+    i_d = (a - math.sqrt(max(square, 0.0))) / b
+    bound = limits.current
+    if limits.levitation_first != 0.0:
+        bound = math.sqrt(max(bound * bound - i_q * i_q, 0.0)) * (1.0 + 1e-12)
+    limited = min(max(i_d, -bound), bound)
+    for motor in range(4):
+        direct[motor] = limited if motor == 1 else 0.0
+        quadrature[motor] = i_q if motor == 1 else 0.0
+    made = (a - b * limited) ** 2 + (b * i_q) ** 2
+    for axis in range(5):
+        realised[axis] = 0.0
+    realised[0], realised[1] = machine.G - made / machine.M_y, gain * i_q
+    excess[0], excess[1] = i_q - u_x, 0.0
+    missed = abs(made - pull) > 1e-6 * machine.M_y * machine.G
+    return bool(missed or i_q != u_x)
+
+
+@compiled
 def exact_inverse(
     machine: Machine,
-    limits: Limits,
+    limits: CurrentLimits,
     controlled: FloatArray,
     output: FloatArray,
     wanted: FloatArray,
@@ -130,8 +176,12 @@ def exact_inverse(
     so i_d = (a − √(P − b² i_q²)) / b. Attraction cannot be negative: w_y is limited so that
     ``least_attraction`` stays, and a tilt gets at most all of its pair. Since P ≥ b² i_q², a pair
     that needs much i_q gets more than half of the attraction, and what that cannot serve limits
-    u_x and u_z.
+    u_x and u_z. Of a machine with a single motor it is that motor that (2) is solved for.
     """
+    if machine.motors == 1.0:
+        return _single_motor_inverse(
+            machine, limits, controlled, output, wanted, direct, quadrature, realised, excess
+        )
     gap, a, b, h = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
     gaps_from_outputs(machine, output, gap)
     for motor in range(4):
@@ -166,7 +216,7 @@ def exact_inverse(
 @compiled
 def _allocate(
     machine: Machine,
-    limits: Limits,
+    limits: CurrentLimits,
     controlled: FloatArray,
     output: FloatArray,
     wanted: FloatArray,
@@ -215,7 +265,7 @@ def _pair_need(i_q: float, b_one: float, b_two: float, difference: float, least:
 
 @compiled
 def _quadrature_limit(
-    limits: Limits, a: FloatArray, b: FloatArray, attraction: FloatArray, first: int
+    limits: CurrentLimits, a: FloatArray, b: FloatArray, attraction: FloatArray, first: int
 ) -> float:
     """Largest |i_q| [A] of a pair of motors, ``first`` and ``first + 2``.
 
@@ -235,7 +285,7 @@ def _quadrature_limit(
 
 @compiled
 def _direct_currents(
-    limits: Limits,
+    limits: CurrentLimits,
     a: FloatArray,
     b: FloatArray,
     first: int,
@@ -273,3 +323,52 @@ def _direct_currents(
         saturated = saturated or abs(limited - direct[motor]) > 1e-9
         direct[motor] = limited
     return bool(saturated)
+
+
+@compiled
+def _all_currents(
+    machine: Machine,
+    limits: CurrentLimits,
+    outputs: FloatArray,
+    wanted: FloatArray,
+    direct: FloatArray,
+    quadrature: FloatArray,
+    possible: NDArray[np.bool_],
+) -> None:
+    controlled, realised, excess = np.ones(5), np.empty(5), np.empty(2)
+    for k in range(outputs.shape[0]):
+        possible[k] = not exact_inverse(
+            machine,
+            limits,
+            controlled,
+            outputs[k],
+            wanted[k],
+            direct[k],
+            quadrature[k],
+            realised,
+            excess,
+        )
+
+
+def exact_currents(
+    machine: Machine, outputs: FloatArray, wanted: FloatArray, limits: CurrentLimits = NO_LIMITS
+) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+    """The currents that :func:`exact_inverse` gives at n instants.
+
+    ``outputs`` y, x, z, phi, theta [m, rad] and ``wanted`` accelerations [m/s², rad/s²], shape (n,
+    5). Returns i_d and i_q of motors 1..4 [A], shape (n, 4), and whether they make the
+    accelerations, shape (n,).
+    """
+    n = len(outputs)
+    direct, quadrature = np.empty((n, 4)), np.empty((n, 4))
+    possible = np.empty(n, dtype=np.bool_)
+    _all_currents(
+        machine,
+        limits,
+        np.ascontiguousarray(outputs, dtype=np.float64),
+        np.ascontiguousarray(wanted, dtype=np.float64),
+        direct,
+        quadrature,
+        possible,
+    )
+    return direct, quadrature, possible

@@ -22,6 +22,12 @@ import yaml
 
 T = TypeVar('T')
 
+SHARED_GROUPS = ('machine', 'guide', 'internal_model', 'y', 'x', 'z', 'phi', 'theta')
+"""Groups that a parameter file may give to all nodes at once, under ``/**``.
+
+A node that has no such group leaves it to the others; one that has it refuses what is wrong in it.
+"""
+
 _METADATA_KEY = 'maglev_parameter'
 _SCALARS: dict[type, str] = {bool: 'bool', int: 'integer', float: 'double', str: 'string'}
 
@@ -206,6 +212,16 @@ def replace(instance: T, overrides: Mapping[str, object]) -> T:
     return build(type(instance), {**values(instance), **overrides})
 
 
+def for_others(name: str, known: Iterable[str]) -> bool:
+    """Whether a parameter is of a shared group that a table with these names has nothing of."""
+    group_name, dot, _ = name.partition('.')
+    return (
+        bool(dot)
+        and group_name in SHARED_GROUPS
+        and not any(other.startswith(group_name + '.') for other in known)
+    )
+
+
 def unknown_parameter(name: str, known: Iterable[str]) -> ParameterError:
     """The error for a name that is no parameter, with the nearest one that is."""
     near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)
@@ -233,7 +249,7 @@ def read_yaml(path: str | Path, node: str) -> dict[str, object]:
     Raises :class:`ParameterError` when the file is missing or is no parameter file.
     """
     try:
-        content = yaml.safe_load(Path(path).read_text(encoding='utf-8')) or {}
+        content = yaml.load(Path(path).read_text(encoding='utf-8'), Loader=_Loader) or {}
     except (OSError, UnicodeDecodeError) as error:
         raise ParameterError(f"cannot read parameter file '{path}': {error}") from error
     except yaml.YAMLError as error:
@@ -256,7 +272,8 @@ def from_yaml(cls: type[T], node: str, *paths: str | Path) -> T:
     overrides: dict[str, object] = {}
     for path in paths:
         overrides.update(read_yaml(path, node))
-    return build(cls, overrides)
+    known = specs(cls)
+    return build(cls, {k: v for k, v in overrides.items() if not for_others(k, known)})
 
 
 def to_yaml(instance: Any, node: str) -> str:
@@ -270,6 +287,22 @@ def to_yaml(instance: Any, node: str) -> str:
         level[last] = list(value) if isinstance(value, tuple) else value
     content = {node: {'ros__parameters': nested}}
     return yaml.dump(content, Dumper=_Dumper, sort_keys=False, default_flow_style=None)
+
+
+class _Loader(yaml.SafeLoader):
+    """Refuses a mapping that names a key twice, of which YAML would silently take the last."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        """Raises yaml.YAMLError with the key and its line."""
+        seen: set[Any] = set()
+        for key_node, _ in node.value:
+            key = self.construct_object(key_node, deep=True)  # type: ignore[no-untyped-call]
+            if key in seen:
+                raise yaml.YAMLError(
+                    f"'{key}' is given twice, again in line {key_node.start_mark.line + 1}"
+                )
+            seen.add(key)
+        return super().construct_mapping(node, deep)
 
 
 class _Dumper(yaml.SafeDumper):

@@ -9,7 +9,7 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.node import Node
 
 from maglev_model import parameters as table
-from maglev_model.parameters import Spec, unknown_parameter
+from maglev_model.parameters import Spec, for_others, unknown_parameter
 
 T = TypeVar('T')
 
@@ -34,10 +34,11 @@ def declare(node: Node, parameter_table: type[T]) -> T:
         for name, parameter in node.get_parameters_by_prefix('').items()
         if not is_ros_own(name)
     }
-    for name in given:
+    ours = {name: value for name, value in given.items() if not for_others(name, specs)}
+    for name in ours:
         if name not in specs:
             raise unknown_parameter(name, specs)
-    built = table.build(parameter_table, given)
+    built = table.build(parameter_table, ours)
     for name in given:
         node.undeclare_parameter(name)
     for name, value in table.values(built).items():

@@ -18,7 +18,7 @@ from maglev_controller.parameters import LAWS, ControllerParameters
 from maglev_controller.regulator import Regulator
 from maglev_model.axes import AXES
 from maglev_model.equilibrium import equilibrium_current, equilibrium_inverse, stiffness
-from maglev_model.inverse import Limits
+from maglev_model.inverse import CurrentLimits
 from maglev_model.machine import MachineParameters, machine_constants
 from maglev_model.parameters import ParameterError, build, read_yaml
 from maglev_model.platen import accelerations
@@ -152,7 +152,7 @@ def test_linearisation_is_that_of_the_full_model(gap: float) -> None:
             got = accelerate(moved, i_d, none)[axis] / (sign * 1e-6)
             assert got == pytest.approx(found[axis], rel=2e-3, abs=1e-6)
     assert found[0] > 0.0
-    limits = Limits(7.0, 0.0, 0.0)
+    limits = CurrentLimits(7.0, 0.0, 0.0)
     for axis in range(5):
         wanted = np.zeros(5)
         wanted[axis] = 1e-4
@@ -172,7 +172,7 @@ def test_what_the_linear_inverse_says_it_realises(wanted: list[float]) -> None:
     direct, quadrature, realised, excess = (np.zeros(n) for n in (4, 4, 5, 2))
     saturated = equilibrium_inverse(
         MACHINE,
-        Limits(7.0, 0.0, 0.0),
+        CurrentLimits(7.0, 0.0, 0.0),
         np.ones(5),
         0.025,
         np.array(wanted),
@@ -203,7 +203,11 @@ def test_what_the_linear_inverse_says_it_realises(wanted: list[float]) -> None:
         ('jacobian_lead_lag', {'compensator__equilibrium': 0.032}, 'between the stops'),
         ('feedback_lead_lag', {'compensator__crossover': (900.0,) * 5}, 'y: a crossover of 900'),
         ('feedback_soi', {'compensator__phase_margin': 80.0}, 'y: .*at most a phase margin of'),
-        ('feedback_soi', {'law': 'feedback_sio'}, "'feedback_sio'.*must be one of output_regulator"),
+        (
+            'feedback_soi',
+            {'law': 'feedback_sio'},
+            "'feedback_sio'.*must be one of output",
+        ),
         ('feedback_soi', {'machine__motors': 1}, "'z.controlled' is true.*y and x only"),
         ('feedback_soi', {'machine__motors': 3}, 'it must be 1 or 4'),
     ],

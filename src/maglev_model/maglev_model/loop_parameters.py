@@ -1,0 +1,49 @@
+"""How fast an axis' loop is and what it learns: what controller and reference both have to know."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+from maglev_model.parameters import parameter
+
+REFERENCE_FREQUENCY = 1.5 * math.pi
+"""ω0 of the paper's sinusoids [rad/s]."""
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class FundamentalParameters:
+    """What the internal models of all axes are built on."""
+
+    fundamental: float = parameter(
+        REFERENCE_FREQUENCY,
+        unit='rad/s',
+        lower=1e-3,
+        upper=1e3,
+        description='frequency of the reference, omega_0',
+    )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class AxisLoopParameters:
+    """The three numbers of an axis' loop, and the frequencies of its internal model (14).
+
+    With a bandwidth W and the speeds i and m at which integrator and oscillators learn, the LQR
+    weights are W⁴ on e², 2 W² on ė², W⁴ i² on the integrator and W⁴ m² on the oscillators' states.
+    """
+
+    multiples: tuple[float, ...] = parameter(
+        (0.0, 1.0, 2.0, 3.0, 4.0, 5.0),
+        lower=0.0,
+        upper=100.0,
+        description='frequencies of the internal model, as multiples of its fundamental',
+    )
+    bandwidth: float = parameter(
+        200.0, unit='rad/s', lower=0.1, upper=1e4, description='bandwidth of the feedback, W'
+    )
+    integration: float = parameter(
+        90.0, unit='rad/s', lower=1e-3, upper=1e4, description='how fast the integrator learns, i'
+    )
+    learning: float = parameter(
+        10.0, unit='rad/s', lower=1e-3, upper=1e4, description='how fast the oscillators learn, m'
+    )

@@ -1,0 +1,100 @@
+"""Quintic transitions against polynomials fitted by NumPy, and their bounds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from maglev_model.quintic import (
+    braking_times,
+    evaluate_quintic,
+    minimum_jerk,
+    minimum_jerk_peaks,
+    minimum_jerk_time,
+    quintic_coefficients,
+    quintic_to_zero,
+    transition_time,
+)
+
+VALUES = st.floats(-1.0, 1.0)
+TIMES = st.floats(0.05, 3.0)
+
+
+def fitted(start: np.ndarray, end: np.ndarray, duration: float) -> np.poly1d:
+    """The quintic with position, velocity, acceleration (3,) at both ends, by a linear solve."""
+    rows = []
+    for time in (0.0, duration):
+        for order in range(3):
+            powers = [np.poly1d(np.eye(6)[k]).deriv(order)(time) for k in range(6)]
+            rows.append(powers)
+    return np.poly1d(np.linalg.solve(np.array(rows, dtype=float), np.concatenate([start, end])))
+
+
+@given(st.tuples(VALUES, VALUES, VALUES), st.tuples(VALUES, VALUES, VALUES), TIMES)
+def test_quintic_joins_two_states(
+    start: tuple[float, ...], end: tuple[float, ...], duration: float
+) -> None:
+    states = [tuple(np.array([value]) for value in state) for state in (start, end)]
+    time = np.linspace(0.0, duration, 7)
+    found = evaluate_quintic(quintic_coefficients(*states, duration), duration, time)
+    wanted = fitted(np.array(start), np.array(end), duration)
+    scale = max(1.0, duration**-2)
+    for order, values in enumerate(found):
+        assert values[:, 0] == pytest.approx(wanted.deriv(order)(time), abs=1e-8 * scale)
+
+
+@given(VALUES, VALUES, VALUES, TIMES, st.floats(0.0, 1.2))
+def test_quintic_to_zero_is_the_same_curve(
+    position: float, velocity: float, acceleration: float, duration: float, share: float
+) -> None:
+    start = tuple(np.array([value]) for value in (position, velocity, acceleration))
+    rest = (np.zeros(1),) * 3
+    elapsed = share * duration
+    found = quintic_to_zero(position, velocity, acceleration, duration, elapsed)
+    if elapsed >= duration:
+        assert found == (0.0, 0.0, 0.0)
+        return
+    coefficients = quintic_coefficients(start, rest, duration)
+    wanted = evaluate_quintic(coefficients, duration, np.array([elapsed]))
+    assert found == pytest.approx([float(value[0, 0]) for value in wanted], rel=1e-12, abs=1e-12)
+
+
+def test_minimum_jerk_is_the_quintic_between_rests() -> None:
+    share = np.linspace(0.0, 1.0, 501)
+    zero, one = np.zeros(1), np.ones(1)
+    coefficients = quintic_coefficients((zero, zero, zero), (one, zero, zero), 1.0)
+    for found, wanted in zip(
+        minimum_jerk(share), evaluate_quintic(coefficients, 1.0, share), strict=True
+    ):
+        assert found == pytest.approx(wanted[:, 0], abs=1e-13)
+    peaks = [np.abs(values).max() for values in minimum_jerk(share)[1:]]
+    assert minimum_jerk_peaks(1.0, 1.0)[:2] == pytest.approx(peaks, rel=1e-4)
+
+
+@given(st.floats(1e-4, 1.0), st.floats(1e-3, 10.0), st.floats(1e-3, 10.0))
+def test_the_shortest_time_meets_one_bound(
+    distance: float, velocity: float, acceleration: float
+) -> None:
+    time = minimum_jerk_time(distance, velocity, acceleration)
+    peak_velocity, peak_acceleration, _ = minimum_jerk_peaks(distance, time)
+    shares = (peak_velocity / velocity, peak_acceleration / acceleration)
+    assert max(shares) == pytest.approx(1.0)
+    assert transition_time(distance, acceleration, 0.0) <= time * (1.0 + 1e-12)
+
+
+@given(st.floats(0.0, 1.0), st.floats(-2.0, 2.0))
+def test_braking_stays_within_the_stops(position: float, velocity: float) -> None:
+    start, speed = np.array([position]), np.array([velocity])
+    longest = 0.4
+    times = braking_times(start, speed, np.zeros(1), np.ones(1), longest)
+    assert 0.05 <= times[0] <= longest
+    end = start + 0.5 * times * speed
+    if times[0] > 0.05:
+        coefficients = quintic_coefficients(
+            (start, speed, np.zeros(1)), (end, np.zeros(1), np.zeros(1)), float(times[0])
+        )
+        way = evaluate_quintic(coefficients, float(times[0]), np.linspace(0.0, times[0], 50))[0]
+        assert way.min() >= -1e-9
+        assert way.max() <= 1.0 + 1e-9
