@@ -298,8 +298,8 @@ def test_compiled_loops_do_what_read_and_write_do() -> None:
     arrays = _stage().arrays
     arrays.command[:] = [-0.3] * 4 + [0.1] * 4
     for _ in range(30):
-        advance(arrays.scalars, arrays.axes, arrays.memory, arrays.command)
-    encode(arrays.scalars, arrays.memory, arrays.reading)
+        advance(arrays.block)
+    encode(arrays.block)
     stage = _stage()
     stage.write([-0.3] * 4, [0.1] * 4)
     for _ in range(31):
