@@ -12,7 +12,6 @@ import time
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from maglev_hw_bridge.diagnosis import diagnose
 from maglev_hw_bridge.drivers import Driver, DriverError, make_driver
@@ -22,12 +21,11 @@ from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.response import Pulses, Twins
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES, PHASE_NAMES, PHASES
 from maglev_hw_bridge.stage import BridgeStage, Mode
+from maglev_model.axes import FloatArray
 from maglev_model.inverse import CurrentLimits, exact_currents
 from maglev_model.machine import machine_constants
 from maglev_model.parameters import ParameterError, from_yaml
 from maglev_model.stage import StageError
-
-FloatArray = NDArray[np.float64]
 
 _HOP = 5e-4  # first lift-off [m]
 _RISE, _HOVER = 0.5, 0.5  # [s]

@@ -40,30 +40,34 @@ class LandingArrays(Record):
     current_limit: float  # of a motor [A]
     stiffness: Annotated[FloatArray, 5]  # [1/s²]
     damping: Annotated[FloatArray, 5]  # [1/s]
-    way: Annotated[FloatArray, 5]  # from the start to where braking ends [m, rad], reversed
+    offset: Annotated[FloatArray, 5]  # of the start from where braking ends [m, rad]
     speed: Annotated[FloatArray, 5]  # at the start
     braking: Annotated[FloatArray, 5]  # [s]
     level: Annotated[FloatArray, 5]  # where braking ends [m, rad]
     elapsed: float  # [s]
     descent_start: float  # [s]
     descent_time: float  # [s]
+    settle_time: float  # [s]
     aim: float  # of the descent [m]
+    period: float  # [s]
     direct: Annotated[FloatArray, 4]  # i_d of motors 1..4 [A], the result
     quadrature: Annotated[FloatArray, 4]  # i_q
 
 
 @compiled
-def land(block: Block, position: FloatArray, rate: FloatArray) -> None:
-    """Write the currents for the present instant of the way down; both (5,) [m, rad], per second.
+def land(block: Block, position: FloatArray, rate: FloatArray) -> bool:
+    """Write the currents of the next sample of the way down; true when the landing is over.
 
-    No motor gets more than the limit, and what carries comes first.
+    ``position`` and ``rate`` (5,) [m, rad] and per second. No motor gets more than the limit, and
+    what carries comes first.
     """
     landing: LandingArrays = block[0]
+    landing.elapsed += landing.period
     time = landing.elapsed
     wanted = np.empty(5)
     for axis in range(5):
         left, velocity, acceleration = quintic_to_zero(
-            landing.way[axis], landing.speed[axis], 0.0, landing.braking[axis], time
+            landing.offset[axis], landing.speed[axis], 0.0, landing.braking[axis], time
         )
         target = landing.level[axis] + left
         if axis == 0 and time >= landing.descent_start:
@@ -91,6 +95,7 @@ def land(block: Block, position: FloatArray, rate: FloatArray) -> None:
         np.empty(5),
         np.empty(2),
     )
+    return time > landing.descent_start + landing.descent_time + landing.settle_time
 
 
 class Landing:
@@ -98,8 +103,6 @@ class Landing:
 
     def __init__(self, parameters: BridgeParameters) -> None:
         landing, machine, fault = parameters.landing, parameters.machine, parameters.fault
-        self._landing = landing
-        self._period = parameters.sample_time
         self._lower = np.maximum(np.array(machine.lower_limit), np.array(fault.lower))
         self._upper = np.minimum(np.array(machine.upper_limit), np.array(fault.upper))
         self.arrays = LandingArrays(
@@ -110,7 +113,9 @@ class Landing:
             braking=landing.braking_time,
             descent_start=landing.braking_time,
             descent_time=landing.descent_time,
+            settle_time=landing.settle_time,
             aim=machine.gap_max + landing.depth,
+            period=parameters.sample_time,
         )
 
     @property
@@ -125,24 +130,19 @@ class Landing:
 
     def begin(self, position: FloatArray, rate: FloatArray) -> None:
         """Start where the platen is: (5,) [m, rad] and per second."""
-        a = self.arrays
-        a.braking[:] = braking_times(
-            position, rate, self._lower, self._upper, self._landing.braking_time
-        )
+        way = self.arrays
+        way.braking[:] = braking_times(position, rate, self._lower, self._upper, way.descent_start)
         if rate[0] < 0.0:  # towards the motors, where a tilt still takes room
-            a.braking[0] = min(a.braking[0], _BRAKING_UPWARD)
-        a.level[:] = np.clip(position + 0.5 * a.braking * rate, self._lower, self._upper)
-        a.level[3:] = 0.0
-        a.way[:] = position - a.level
-        a.speed[:] = rate
-        a.elapsed = 0.0
+            way.braking[0] = min(way.braking[0], _BRAKING_UPWARD)
+        way.level[:] = np.clip(position + 0.5 * way.braking * rate, self._lower, self._upper)
+        way.level[3:] = 0.0
+        way.offset[:] = position - way.level
+        way.speed[:] = rate
+        way.elapsed = 0.0
 
     def step(self, position: FloatArray, rate: FloatArray) -> bool:
         """Compute the currents of the next sample; true when the landing is over."""
-        a = self.arrays
-        a.elapsed += self._period
-        land(a.block, position, rate)
-        return a.elapsed > a.descent_start + a.descent_time + self._landing.settle_time
+        return land(self.arrays.block, position, rate)
 
 
 @compiled

@@ -7,7 +7,6 @@ the platen really is; the plant's physics carry the platen.
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from typing import Annotated
 
@@ -191,8 +190,7 @@ def _plant(parameters: BridgeParameters, step: float) -> PlantParameters:
         substeps=1,
         seed=emulation.seed,
         machine=parameters.machine,
-        amplifier=dataclasses.replace(
-            AmplifierParameters(),
+        amplifier=AmplifierParameters(
             bandwidth=0.0,
             peak_current=1e6,
             continuous_current=1e6,
