@@ -18,9 +18,11 @@ from scipy.integrate import solve_ivp
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
+from maglev_model.compiled import compiled
 from maglev_model.machine import machine_from_array
 from maglev_model.parameters import build, read_yaml
-from maglev_plant.arrays import STATE
+from maglev_model.records import Block
+from maglev_plant.arrays import StageArrays
 from maglev_plant.dynamics import derivative
 from maglev_plant.encoder import encode
 from maglev_plant.parameters import PlantParameters
@@ -62,26 +64,32 @@ def compiled_loop(references: References) -> tuple[float, np.ndarray]:
     return time.perf_counter() - start, np.asarray(outcome.output)
 
 
+@compiled
+def state_rate(block: Block, state: np.ndarray, current: np.ndarray, rate: np.ndarray) -> None:
+    """Write the rate of change of a stage's state, all (10,), with currents (8,) flowing."""
+    stage: StageArrays = block[0]
+    derivative(stage, machine_from_array(stage.machine), 0.0, state, current, rate)
+
+
 def scipy_loop(references: References) -> tuple[float, np.ndarray]:
     """The same with an adaptive integrator, without stops and amplifier limits, not met here."""
     stage, regulator = stage_at(references), Regulator(ControllerParameters())
-    scalars, axes, memory, _, reading = stage.arrays
-    machine = machine_from_array(scalars)
+    arrays = stage.arrays
     period = stage.parameters.sample_time
     lag_rate = 2.0 * math.pi * stage.parameters.amplifier.bandwidth
-    state = memory[STATE : STATE + 10]
+    state, reading = arrays.state, arrays.reading
     current, target, rate = np.zeros(8), np.zeros(8), np.zeros(10)
     outputs = np.empty_like(references.position)
 
     def right_hand_side(elapsed: float, y: np.ndarray) -> np.ndarray:
         flowing = target + (current - target) * math.exp(-lag_rate * elapsed)
-        derivative(scalars, axes, machine, 0.0, y, flowing, rate)
+        state_rate(arrays.block, y, flowing, rate)
         return np.array(rate)
 
     start = time.perf_counter()
     for k, reference in enumerate(zip(*references, strict=True)):
         outputs[k] = state[::2]
-        encode(scalars, memory, reading)
+        encode(arrays.block)
         regulator.step(reading[:4], reading[4], reading[5], *reference, target[:4], target[4:])
         solution = solve_ivp(right_hand_side, (0.0, period), state, rtol=1e-8, atol=1e-11)
         state[:] = solution.y[:, -1]

@@ -14,15 +14,18 @@ import sys
 import numpy as np
 
 from maglev_hw_bridge.drivers.emulated import EmulatedDriver
-from maglev_hw_bridge.landing import currents, impact_of_cut
+from maglev_hw_bridge.landing import impact_of_cut
 from maglev_hw_bridge.opening import open_stage
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES
 from maglev_hw_bridge.stage import BridgeStage, Mode
+from maglev_model.inverse import CurrentLimits, exact_currents
+from maglev_model.machine import machine_constants
 from maglev_model.parameters import build
 
 SOFT = 0.05  # [m/s]
 HEIGHTS = (0.019, 0.020, 0.0225, 0.025, 0.0275, 0.0285, 0.030)  # air gap [m]
+LIMITS = CurrentLimits(7.0, 1.0, 0.0)
 _JUMP = 100  # counts
 OMEGA = 1.5 * math.pi  # of the ellipse [rad/s]
 
@@ -49,12 +52,12 @@ def airborne(motion: Motion) -> tuple[BridgeStage, EmulatedDriver]:
     stage.deactivate()
     driver.boards.rig.place(position, velocity)
     stage.activate()
-    i_d, i_q = np.zeros(4), np.zeros(4)
+    machine = machine_constants(stage.parameters.machine)
     for _ in range(8):
         stage.read()
-        watched = stage.guard.arrays
-        currents(watched.machine, watched.position, acceleration, 7.0, i_d, i_q)
-        stage.write(i_d, i_q)
+        position = stage.guard.arrays.position
+        i_d, i_q, _ = exact_currents(machine, position[None], acceleration[None], LIMITS)
+        stage.write(i_d[0], i_q[0])
     stage.read()
     driver.boards.rig.forget_impact()
     return stage, driver

@@ -97,8 +97,8 @@ def test_the_same_flight_on_plant_and_boards() -> None:
         errors = []
         for k in range(4000):
             time = 1e-3 * k
-            share = min(time, 1.0)
-            lift = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+            risen = min(time, 1.0)
+            lift = risen**3 * (10.0 - 15.0 * risen + 6.0 * risen**2)
             angle = 4.71238898038469 * time
             wave = 0.03 * lift * np.sin([angle, angle + 1.5])
             y = 0.031 - 0.006 * lift + 0.004 * lift * np.sin(angle)

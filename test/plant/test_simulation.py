@@ -175,9 +175,9 @@ def test_bad_currents_are_refused_and_the_last_good_ones_held(
 
 def test_written_arrays_may_be_reused() -> None:
     stage = _stage()
-    mine = np.full(4, 0.1)
-    stage.write(mine, mine)
-    mine[:] = 9.0
+    written = np.full(4, 0.1)
+    stage.write(written, written)
+    written[:] = 9.0
     stage.read()
     stage.read()
     assert list(stage.direct_current) == [0.1] * 4
@@ -298,8 +298,8 @@ def test_compiled_loops_do_what_read_and_write_do() -> None:
     arrays = _stage().arrays
     arrays.command[:] = [-0.3] * 4 + [0.1] * 4
     for _ in range(30):
-        advance(arrays.scalars, arrays.axes, arrays.memory, arrays.command)
-    encode(arrays.scalars, arrays.memory, arrays.reading)
+        advance(arrays.block)
+    encode(arrays.block)
     stage = _stage()
     stage.write([-0.3] * 4, [0.1] * 4)
     for _ in range(31):

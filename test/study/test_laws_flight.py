@@ -37,7 +37,7 @@ def test_every_law_lifts_off_and_follows_the_ellipse(name: str) -> None:
     """From the lower stop, and then in 4DOF, or 3DOF with the tilts locked."""
     law = contestant(name)
     flight = Flight(law)
-    flight.stage.arrays.memory[0] = FLOOR[Y]
+    flight.stage.arrays.state[0] = FLOOR[Y]
     lifted = run(flight.regulator, flight.stage, shaped(FLOOR, HOVER, 1.5, 4.0, flight.period))
     assert lifted.output[:, Y].min() > 0.0248
     assert abs(lifted.output[-1, Y] - 0.025) < 5e-5

@@ -8,18 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
+from maglev_model.records import Block
 from maglev_model.stage import EncoderSample, motor_currents
-from maglev_plant.arrays import (
-    FLOWING,
-    LOAD,
-    SAMPLE,
-    STATE,
-    FloatArray,
-    StageArrays,
-    initial_memory,
-    stage_arrays,
-)
+from maglev_plant.arrays import StageArrays, stage_arrays
 from maglev_plant.dynamics import advance
 from maglev_plant.encoder import encode
 from maglev_plant.parameters import PlantParameters
@@ -38,17 +31,10 @@ class Trajectory(NamedTuple):
 
 
 @compiled
-def _read(
-    scalars: FloatArray,
-    axes: FloatArray,
-    memory: FloatArray,
-    command: FloatArray,
-    reading: FloatArray,
-    first: bool,
-) -> None:
+def _read(block: Block, first: bool) -> None:
     if not first:
-        advance(scalars, axes, memory, command)
-    encode(scalars, memory, reading)
+        advance(block)
+    encode(block)
 
 
 @compiled
@@ -84,34 +70,33 @@ class SimulatedStage:
     @property
     def sequence(self) -> int:
         """Number of the sample the plant stands at."""
-        return int(self._arrays.memory[SAMPLE])
+        return self._arrays.sample
 
     @property
     def state(self) -> FloatArray:
         """True x1..x10 [m, m/s, rad, rad/s], shape (10,), a copy."""
-        return np.array(self._arrays.memory[STATE : STATE + 10])
+        return np.array(self._arrays.state)
 
     @property
     def direct_current(self) -> FloatArray:
         """i_d flowing in motors 1..4 [A], shape (4,), a copy."""
-        return np.array(self._arrays.memory[FLOWING : FLOWING + 4])
+        return np.array(self._arrays.flowing[:4])
 
     @property
     def quadrature_current(self) -> FloatArray:
         """i_q flowing in motors 1..4 [A], shape (4,), a copy."""
-        return np.array(self._arrays.memory[FLOWING + 4 : FLOWING + 8])
+        return np.array(self._arrays.flowing[4:])
 
     @property
     def thermal_load(self) -> FloatArray:
         """Used share of the thermal budget of motors 1..4, each its hottest phase, shape (4,)."""
-        load: FloatArray = self._arrays.memory[LOAD : LOAD + 12].reshape(4, 3).max(axis=1)
+        load: FloatArray = self._arrays.load.reshape(4, 3).max(axis=1)
         return load
 
     def read(self) -> EncoderSample:
         """The next sample; see the class."""
-        arrays = self._arrays
-        reading = np.empty(6)
-        _read(arrays.scalars, arrays.axes, arrays.memory, arrays.command, reading, self._first)
+        _read(self._arrays.block, self._first)
+        reading = self._arrays.reading.copy()
         self._first = False
         return EncoderSample(reading[:4], reading.item(4), reading.item(5))
 
@@ -129,8 +114,7 @@ class SimulatedStage:
 
     def reset(self) -> None:
         """Go back to sample 0 and the initial state, without current, amplifiers cold."""
-        self._arrays.memory[:] = initial_memory(self.parameters)
-        self._arrays.command[:] = 0.0
+        self._arrays.block[:] = stage_arrays(self.parameters).block
         self._first = True
 
     def close(self) -> None:

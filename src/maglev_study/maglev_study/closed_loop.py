@@ -13,7 +13,8 @@ from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import MeasurementFault, Regulator
 from maglev_controller.sample_step import ControlArrays, control_step
 from maglev_model.compiled import compiled
-from maglev_plant.arrays import STATE, StageArrays
+from maglev_model.records import Block
+from maglev_plant.arrays import StageArrays
 from maglev_plant.dynamics import advance
 from maglev_plant.encoder import encode
 from maglev_plant.parameters import PlantParameters
@@ -53,7 +54,7 @@ class Run:
 @compiled
 def _loop(
     control: ControlArrays,
-    stage: StageArrays,
+    block: Block,
     position: FloatArray,
     velocity: FloatArray,
     acceleration: FloatArray,
@@ -63,11 +64,11 @@ def _loop(
     delayed: bool,
 ) -> int:
     """All samples, or up to the first that the regulator refuses; returns how many went well."""
+    stage: StageArrays = block[0]
     answer = np.zeros(8)
     for k in range(position.shape[0]):
-        for i in range(10):
-            state[k, i] = stage.memory[STATE + i]
-        encode(stage.scalars, stage.memory, stage.reading)
+        state[k] = stage.state
+        encode(block)
         code[k] = control_step(
             control.constants,
             control.law,
@@ -87,11 +88,11 @@ def _loop(
         if code[k] > law.SATURATED:
             return k
         if delayed:
-            advance(stage.scalars, stage.axes, stage.memory, stage.command)
+            advance(block)
         for i in range(8):
             stage.command[i] = current[k, i] = answer[i]
         if not delayed:
-            advance(stage.scalars, stage.axes, stage.memory, stage.command)
+            advance(block)
     return int(position.shape[0])
 
 
@@ -120,7 +121,15 @@ def run(
     code = np.zeros(n, dtype=np.int8)
     arrays = stage.arrays
     done = _loop(
-        regulator.arrays, arrays, position, velocity, acceleration, state, current, code, delayed
+        regulator.arrays,
+        arrays.block,
+        position,
+        velocity,
+        acceleration,
+        state,
+        current,
+        code,
+        delayed,
     )
     if done < n:
         gap, x, z = arrays.reading[:4], float(arrays.reading[4]), float(arrays.reading[5])

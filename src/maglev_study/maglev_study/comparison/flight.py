@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import MeasurementFault, Regulator
+from maglev_model.records import Block
 from maglev_plant.simulation import SimulatedStage
 from maglev_study.closed_loop import References, Run, run
 from maglev_study.comparison.contestants import Contestant
@@ -81,15 +82,13 @@ class Flight:
         """Go from 25 mm to a set-point (5,) in ``time`` [s] and hold it; false when that fails."""
         return self.follow(shaped(HOVER, goal, time, hold, self.period)) is not None
 
-    def save(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def save(self) -> tuple[Block, FloatArray]:
         """All that changes with time, for :meth:`restore`."""
-        arrays = self.stage.arrays
-        return arrays.memory.copy(), arrays.command.copy(), self.regulator.arrays.state.copy()
+        return self.stage.arrays.block.copy(), self.regulator.arrays.state.copy()
 
-    def restore(self, saved: tuple[FloatArray, FloatArray, FloatArray]) -> None:
+    def restore(self, saved: tuple[Block, FloatArray]) -> None:
         """Go back to what was saved."""
-        arrays = self.stage.arrays
-        arrays.memory[:], arrays.command[:], self.regulator.arrays.state[:] = saved
+        self.stage.arrays.block[:], self.regulator.arrays.state[:] = saved
 
     def step(self, begin: FloatArray, target: FloatArray, time: float, hold: float) -> Run | None:
         """A step from the set-point ``begin`` to ``target`` (5,), raw for ``time`` 0 [s].
