@@ -15,7 +15,6 @@ import numpy as np
 
 from maglev_hw_bridge.drivers.emulated import EmulatedDriver
 from maglev_hw_bridge.landing import impact_of_cut
-from maglev_hw_bridge.opening import open_stage
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES
 from maglev_hw_bridge.stage import BridgeStage, Mode
@@ -46,7 +45,7 @@ def airborne(motion: Motion) -> tuple[BridgeStage, EmulatedDriver]:
     """A bridge whose platen is in that motion."""
     position, velocity, acceleration = motion
     home = {'homing.at_start': True, 'homing.x': 0.0, 'homing.z': 0.0}
-    stage = open_stage(build(BridgeParameters, home))
+    stage = BridgeStage.ready(build(BridgeParameters, home))
     driver = stage.driver
     assert isinstance(driver, EmulatedDriver)
     stage.deactivate()

@@ -219,8 +219,12 @@ in_environment() {
 # Fill the caches of compiled functions and modules, so that the first run starts as quickly as the
 # second. Only that depends on it, so a defect of the code is left for a run or the tests to show.
 warm_up() {
-  in_environment python -c 'import maglev_hw_bridge.node, maglev_hw_bridge.opening as bridge
-bridge.warm_up()' &
+  in_environment python -c 'import maglev_hw_bridge.node as bridge
+from maglev_model.parameters import build
+stage = bridge.BridgeStage.ready(build(bridge.BridgeParameters, {"homing.at_start": True}))
+stage.read()
+stage.hold()
+stage.close()' &
   in_environment python -c 'import maglev_study.closed_loop as loop
 import maglev_controller.node, maglev_plant.node, maglev_reference.node
 import maglev_monitor.bag.analyze, maglev_monitor.live.node, maglev_monitor.bag.recorder, maglev_monitor.report.report

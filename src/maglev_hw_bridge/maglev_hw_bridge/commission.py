@@ -188,7 +188,7 @@ def _hop(stage: BridgeStage, parameters: BridgeParameters) -> tuple[float, float
         if stage.mode is not Mode.FOLLOWING:
             break
     stage.land('commissioned')
-    while stage.flying or stage.mode is Mode.LANDING:
+    while stage.flying:
         stage.hold()
         stage.read()
     return float(np.mean(heights)) if heights else 0.0, tilt

@@ -13,9 +13,10 @@ from std_srvs.srv import Trigger
 from maglev_model.parameters import parameter
 from maglev_model.phases import Phase
 from maglev_msgs.msg import Currents, Measurement, Reference
+from maglev_node.graph_guard import GraphGuard
 from maglev_node.node import MaglevNode, SourceParameters
-from maglev_node.node import main as run_main
 from maglev_node.polling import Queues
+from maglev_node.process import main as run_main
 from maglev_node.stamp import stamp_now
 from maglev_node.topics import CURRENTS, MEASUREMENT, REFERENCE, sample_qos
 from maglev_reference.accuracy import summary, warnings
@@ -79,7 +80,8 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
             self.get_logger().warning(line)
         for line in summary(self.parameters):
             self.get_logger().info(line)
-        self.claim(REFERENCE, 'reference')
+        self._graph = GraphGuard(self)
+        self._graph.claim(REFERENCE, 'reference')
         self._timeline: Timeline | None = None
         self._expected = self.parameters.watchers + 1  # and the controller
         self._origin = 0  # the stage's sequence at the timeline's sample 0
@@ -142,7 +144,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         return f'waiting for the controller to answer on {CURRENTS}'
 
     def _start(self, measurement: Measurement) -> None:
-        if not self.alone():
+        if not self._graph.alone():
             return
         try:
             rest = outputs(
@@ -160,7 +162,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
 
     def _refuse(self, message: str) -> None:
         """Fail; but while another reference may yet be discovered, it may be flying the platen."""
-        if not self.on_probation():
+        if not self._graph.on_probation():
             self.fail(message)
 
     def _publish(self, timeline: Timeline) -> None:

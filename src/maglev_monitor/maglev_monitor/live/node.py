@@ -22,8 +22,8 @@ from maglev_monitor.metrics.settings import RunParameters, run_to_json
 from maglev_monitor.report.table import table
 from maglev_node import topics
 from maglev_node.node import MaglevNode, NodeError, NodeParameters
-from maglev_node.node import main as run_main
 from maglev_node.polling import PolledSubscription, Queues
+from maglev_node.process import main as run_main
 from maglev_node.stamp import seconds
 
 KEYS = {
