@@ -7,11 +7,13 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import Trigger
 
 from maglev_model.parameters import parameter
 from maglev_model.phases import Phase
+from maglev_model.platen import outputs_of_gaps
 from maglev_msgs.msg import Currents, Measurement, Reference
 from maglev_node.node import MaglevNode, SourceParameters
 from maglev_node.node import main as run_main
@@ -20,7 +22,6 @@ from maglev_node.stamp import stamp_now
 from maglev_node.topics import CURRENTS, MEASUREMENT, REFERENCE, sample_qos
 from maglev_reference.accuracy import summary, warnings
 from maglev_reference.check import UnreachableError
-from maglev_reference.geometry import outputs
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.timeline import Timeline
 
@@ -144,15 +145,12 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
     def _start(self, measurement: Measurement) -> None:
         if not self.alone():
             return
+        radius = self.parameters.machine.radius
+        rest = outputs_of_gaps(np.array(measurement.gap), measurement.x, measurement.z, radius)
         try:
-            rest = outputs(
-                measurement.gap, measurement.x, measurement.z, self.parameters.limits.radius
-            )
             self._timeline = Timeline(self.parameters, rest, self._autostart)
         except UnreachableError as error:
             self._refuse(str(error))
-        except ValueError as error:
-            self._refuse(f'lift-off refused: {error}; check the encoders')
         else:
             self._origin = self._newest
             start = 'starting' if self._autostart else 'resting until ~/lift_off'
