@@ -22,7 +22,8 @@ from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.timeline import Timeline
-from maglev_study.closed_loop import References, run
+from maglev_study.closed_loop import run
+from maglev_study.references import References
 
 PARAMS = Path(__file__).parents[2] / 'params'
 SINGLE = MachineParameters(motors=1, mass_y=1.725, mass_x=5.3)

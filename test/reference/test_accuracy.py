@@ -20,7 +20,8 @@ from maglev_reference.accuracy import compliance, expected_error, harmonics, sum
 from maglev_reference.parameters import TRAJECTORIES, ReferenceParameters
 from maglev_reference.timeline import Timeline
 from maglev_reference.trajectories import course
-from maglev_study.closed_loop import References, run
+from maglev_study.closed_loop import run
+from maglev_study.references import References
 
 PARAMS = Path(__file__).parents[2] / 'params'
 OMEGA_0 = 1.5 * math.pi
