@@ -14,16 +14,23 @@ from maglev_controller.regulator import Regulator
 from maglev_model.parameters import ParameterError, build, read_yaml, replace
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
-from maglev_study.closed_loop import run
-from maglev_study.references import References, ellipse_at
+from maglev_study.closed_loop import References, run
 
 PARAMS = Path(__file__).parents[2] / 'params'
 PERIOD, OMEGA = 1e-3, 1.5 * math.pi
+HOVER = np.array([0.025, 0.0, 0.0, 0.0, 0.0])
 
 
 def ellipse(first: int, samples: int) -> References:
     """The 4DOF ellipse from sample ``first`` on."""
-    return ellipse_at(OMEGA * PERIOD * (first + np.arange(samples))[:, None], 0.010)
+    amplitude = np.array([0.005, 0.03, 0.03, 0.0, 0.010])
+    angle = OMEGA * PERIOD * (first + np.arange(samples))[:, None]
+    angle = angle + np.array([-math.pi / 2, -math.pi / 2, 0.0, 0.0, 0.0])
+    return References(
+        HOVER + amplitude * np.sin(angle),
+        amplitude * OMEGA * np.cos(angle),
+        -amplitude * OMEGA**2 * np.sin(angle),
+    )
 
 
 def stage(plant: str, references: References) -> SimulatedStage:
