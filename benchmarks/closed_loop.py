@@ -27,25 +27,13 @@ from maglev_plant.dynamics import derivative
 from maglev_plant.encoder import encode
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
-from maglev_study.closed_loop import References, run, warm_up
+from maglev_study.closed_loop import run, warm_up
+from maglev_study.references import References, ellipse
 
 REAL_TIME_FACTOR = 100.0
 SCIPY_RATIO = 30.0
+THETA = 0.010  # amplitude of the ellipse in 4DOF [rad]
 BENCHMARK = Path(__file__).parents[1] / 'params' / 'benchmark.yaml'
-
-
-def ellipse(samples: int, period: float) -> References:
-    """The paper's 4DOF reference at 1.5π rad/s, from its start on."""
-    omega = 1.5 * math.pi
-    offset = np.array([0.025, 0.0, 0.0, 0.0, 0.0])
-    amplitude = np.array([0.005, 0.03, 0.03, 0.0, 0.01])
-    angle = omega * period * np.arange(samples)[:, None]
-    angle = angle + np.array([-0.5 * math.pi, -0.5 * math.pi, 0.0, 0.0, 0.0])
-    return References(
-        position=offset + amplitude * np.sin(angle),
-        velocity=amplitude * omega * np.cos(angle),
-        acceleration=-amplitude * omega**2 * np.sin(angle),
-    )
 
 
 def stage_at(references: References) -> SimulatedStage:
@@ -105,11 +93,11 @@ def main() -> int:
     arguments = parser.parse_args()
     period = ControllerParameters().sample_time
     warm_up()
-    scipy_loop(ellipse(2, period))
+    scipy_loop(ellipse(2.0 * period, THETA, period))
 
-    long_run = ellipse(round(arguments.duration / period), period)
+    long_run = ellipse(arguments.duration, THETA, period)
     seconds = min(compiled_loop(long_run)[0] for _ in range(3)) / arguments.duration
-    short_run = ellipse(round(arguments.scipy_duration / period), period)
+    short_run = ellipse(arguments.scipy_duration, THETA, period)
     scipy_time, scipy_outputs = scipy_loop(short_run)
     scipy_seconds = scipy_time / arguments.scipy_duration
     apart = np.abs(scipy_outputs - compiled_loop(short_run)[1]).max()

@@ -21,27 +21,16 @@ from maglev_hw_bridge.stage import BridgeStage, Mode
 from maglev_model.inverse import CurrentLimits, exact_currents
 from maglev_model.machine import machine_constants
 from maglev_model.parameters import build
+from maglev_study.references import References, ellipse_at
 
 SOFT = 0.05  # [m/s]
 HEIGHTS = (0.019, 0.020, 0.0225, 0.025, 0.0275, 0.0285, 0.030)  # air gap [m]
 LIMITS = CurrentLimits(7.0, 1.0, 0.0)
 _JUMP = 100  # counts
-OMEGA = 1.5 * math.pi  # of the ellipse [rad/s]
+THETA = 0.010  # amplitude of the ellipse in 4DOF [rad]
 
 
-Motion = tuple[np.ndarray, np.ndarray, np.ndarray]
-"""Position, velocity and acceleration of y, x, z, phi, theta, shape (5,) each."""
-
-
-def ellipse(phase: float) -> Motion:
-    """The motion on the ellipse at a phase [rad]."""
-    amplitude = np.array([0.005, 0.03, 0.03, 0.0, 0.01])
-    angle = phase + np.array([-0.5 * math.pi, -0.5 * math.pi, 0.0, 0.0, 0.0])
-    position = amplitude * np.sin(angle) + np.array([0.025, 0.0, 0.0, 0.0, 0.0])
-    return position, amplitude * OMEGA * np.cos(angle), -amplitude * OMEGA**2 * np.sin(angle)
-
-
-def airborne(motion: Motion) -> tuple[BridgeStage, EmulatedDriver]:
+def airborne(motion: References) -> tuple[BridgeStage, EmulatedDriver]:
     """A bridge whose platen is in that motion."""
     position, velocity, acceleration = motion
     home = {'homing.at_start': True, 'homing.x': 0.0, 'homing.z': 0.0}
@@ -62,7 +51,7 @@ def airborne(motion: Motion) -> tuple[BridgeStage, EmulatedDriver]:
     return stage, driver
 
 
-def landed(motion: Motion, jumping: int | None = None) -> float:
+def landed(motion: References, jumping: int | None = None) -> float:
     """Speed at the stop when the bridge lands because it must, or an encoder (0..5) jumps [m/s]."""
     stage, driver = airborne(motion)
     if jumping is None:
@@ -82,7 +71,7 @@ def landed(motion: Motion, jumping: int | None = None) -> float:
     return driver.boards.rig.impact
 
 
-def cut(motion: Motion) -> tuple[float, float, str]:
+def cut(motion: References) -> tuple[float, float, str]:
     """Speed at the stop when the current is cut: as it is, as foretold [m/s]; which stop."""
     stage, driver = airborne(motion)
     watched = stage.guard.arrays
@@ -96,12 +85,15 @@ def cut(motion: Motion) -> tuple[float, float, str]:
 def main() -> int:
     """Print the table; tell by the exit code whether every landing was soft."""
     still = np.zeros(5)
-    places: list[tuple[str, Motion]] = [
-        (f'at rest, y = {y * 1e3:.1f} mm', (np.array([y, 0.0, 0.0, 0.0, 0.0]), still, still))
+    places: list[tuple[str, References]] = [
+        (
+            f'at rest, y = {y * 1e3:.1f} mm',
+            References(np.array([y, 0.0, 0.0, 0.0, 0.0]), still, still),
+        )
         for y in HEIGHTS
     ]
     for degrees in range(0, 360, 45):
-        places.append((f'on the ellipse, {degrees} deg', ellipse(math.radians(degrees))))
+        places.append((f'on the ellipse, {degrees} deg', ellipse_at(math.radians(degrees), THETA)))
     worst = 0.0
     print(f'{"m/s at the stop":26}{"landed":>8}{"cut":>8}{"foretold":>10}  stop')
     for name, motion in places:
@@ -110,7 +102,10 @@ def main() -> int:
         worst = max(worst, soft)
         print(f'{name:26}{soft:8.3f}{hard:8.2f}{foretold:10.2f}  {stop}')
     for encoder, name in enumerate(ENCODER_NAMES):
-        soft = max(landed(ellipse(math.radians(degrees)), encoder) for degrees in range(0, 360, 45))
+        soft = max(
+            landed(ellipse_at(math.radians(degrees), THETA), encoder)
+            for degrees in range(0, 360, 45)
+        )
         worst = max(worst, soft)
         print(f'{f"on the ellipse, {name} jumps":26}{soft:8.3f}')
     print(f'landed: {worst:.3f} m/s at most, limit {SOFT:g} m/s')

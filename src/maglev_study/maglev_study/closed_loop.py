@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +11,7 @@ from maglev_controller import sample_step as law
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import MeasurementFault, Regulator
 from maglev_controller.sample_step import ControlArrays, control_step
+from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
 from maglev_model.records import Block
 from maglev_plant.arrays import StageArrays
@@ -19,16 +19,7 @@ from maglev_plant.dynamics import advance
 from maglev_plant.encoder import encode
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
-
-FloatArray = NDArray[np.float64]
-
-
-class References(NamedTuple):
-    """A reference for n samples, (n, 5) each: y, x, z, phi, theta [m, rad] and derivatives."""
-
-    position: FloatArray
-    velocity: FloatArray
-    acceleration: FloatArray
+from maglev_study.references import References
 
 
 @dataclasses.dataclass(frozen=True)

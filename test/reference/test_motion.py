@@ -1,4 +1,4 @@
-"""Geometry (5), the quintic against SciPy's Hermite interpolation, and its peaks."""
+"""Motions: the quintic against SciPy's Hermite interpolation, and its peaks."""
 
 import numpy as np
 import pytest
@@ -7,49 +7,10 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from scipy.interpolate import BPoly
 
-from maglev_reference.geometry import motor_gaps, outputs
-from maglev_reference.profiles import (
-    Quintic,
-    Stand,
-    State,
-    minimum_jerk_peaks,
-    minimum_jerk_time,
-    state_at,
-)
-
-RADIUS = 0.397
+from maglev_model.quintic import minimum_jerk_peaks
+from maglev_reference.motion import Quintic, Stand, State, state_at
 
 vectors = hnp.arrays(float, 5, elements=st.floats(-1.0, 1.0, width=32))
-
-
-@given(
-    st.floats(0.018, 0.031),
-    st.floats(-0.05, 0.05),
-    st.floats(-0.05, 0.05),
-    st.floats(-0.003, 0.003),
-    st.floats(-0.014, 0.014),
-)
-@settings(max_examples=50, deadline=None)
-def test_geometry_round_trip(y, x, z, phi, theta):
-    position = np.array([y, x, z, phi, theta])
-    gap = motor_gaps(position, RADIUS)
-    assert gap == pytest.approx(
-        [
-            y - RADIUS * np.sin(phi),
-            y + RADIUS * np.sin(theta),
-            y + RADIUS * np.sin(phi),
-            y - RADIUS * np.sin(theta),
-        ],
-        abs=1e-15,
-    )
-    assert outputs(gap, x, z, RADIUS) == pytest.approx(position, abs=1e-14)
-
-
-def test_geometry_refuses_readings_no_platen_gives():
-    with pytest.raises(ValueError, match='not finite'):
-        outputs([0.03, np.nan, 0.03, 0.03], 0.0, 0.0, RADIUS)
-    with pytest.raises(ValueError, match='no tilt'):
-        outputs([0.0, 0.5, 1.0, 0.5], 0.0, 0.0, RADIUS)
 
 
 @given(
@@ -101,15 +62,6 @@ def test_peaks_of_the_minimum_jerk_move(distance, duration):
     steepest = np.abs(np.diff(found.acceleration[:-1, 1]) / time[1]).max()
     assert steepest == pytest.approx(jerk, rel=2e-3)
     assert (np.diff(found.position[:, 1]) >= 0.0).all()
-
-
-@given(st.floats(1e-4, 0.1), st.floats(0.01, 1.0), st.floats(0.1, 20.0))
-@settings(max_examples=50, deadline=None)
-def test_shortest_time_uses_one_limit_up(distance, velocity, acceleration):
-    duration = minimum_jerk_time(distance, velocity, acceleration)
-    peak_velocity, peak_acceleration, _ = minimum_jerk_peaks(distance, duration)
-    used = (peak_velocity / velocity, peak_acceleration / acceleration)
-    assert max(used) == pytest.approx(1.0, rel=1e-12)
 
 
 def test_stand_stands():
