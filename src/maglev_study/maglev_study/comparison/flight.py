@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,15 +81,16 @@ class Flight:
         """Go from 25 mm to a set-point (5,) in ``time`` [s] and hold it; false when that fails."""
         return self.follow(shaped(HOVER, goal, time, hold, self.period)) is not None
 
-    def save(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def save(self) -> tuple[NDArray[Any], ...]:
         """All that changes with time, for :meth:`restore`."""
         arrays = self.stage.arrays
-        return arrays.memory.copy(), arrays.command.copy(), self.regulator.arrays.state.copy()
+        return arrays.memory.copy(), arrays.command.copy(), *self.regulator.save()
 
-    def restore(self, saved: tuple[FloatArray, FloatArray, FloatArray]) -> None:
+    def restore(self, saved: tuple[NDArray[Any], ...]) -> None:
         """Go back to what was saved."""
         arrays = self.stage.arrays
-        arrays.memory[:], arrays.command[:], self.regulator.arrays.state[:] = saved
+        arrays.memory[:], arrays.command[:] = saved[:2]
+        self.regulator.restore(saved[2:])
 
     def step(self, begin: FloatArray, target: FloatArray, time: float, hold: float) -> Run | None:
         """A step from the set-point ``begin`` to ``target`` (5,), raw for ``time`` 0 [s].
