@@ -165,6 +165,8 @@ def test_the_paper_law_is_equations_14_to_17() -> None:
     parameters = paper()
     bench = Bench(parameters)
     design = bench.regulator.designs[1]
+    assert design.model is not None
+    K = design.gain - np.array([0.0, 0.0, *design.model.output])
     xi, filtered, sample_time = np.zeros(3), 0.0, parameters.sample_time
     rng = np.random.default_rng(3)
     phi, unit, E = design.model.state, np.array([0.0, 0.0, 1.0]), np.full(3, 7e-5)
@@ -176,7 +178,7 @@ def test_the_paper_law_is_equations_14_to_17() -> None:
         filtered = error if k == 0 else filtered
         rate = 2000.0 / 3.0 * (error - filtered)
         filtered += 2.0 / 3.0 * (error - filtered)
-        w = design.gain @ [error, rate, *xi] + xi[0]
+        w = K @ [error, rate, *xi] + xi[0]
         assert bench.regulator.virtual_input[1] == pytest.approx(w, rel=1e-9, abs=1e-12)
         wanted = w / h_x
         got = bench.quadrature[1]

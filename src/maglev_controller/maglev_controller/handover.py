@@ -6,9 +6,9 @@ from typing import Final
 
 import numpy as np
 
-from maglev_controller.design.internal_model import FloatArray
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.sample_step import ControlArrays
+from maglev_model.axes import FloatArray
 from maglev_model.parameters import ParameterError, values
 
 ON_THE_GROUND: Final = ('sample_time', 'law', 'inverse', 'input_delay', 'machine.', 'compensator.')

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from maglev_controller.design.gains import AxisDesign
+from maglev_controller.design.axis_design import AxisDesign
 from maglev_controller.design.margins import LoopMargins, all_margins, check_margins
 from maglev_controller.design.observer import NO_OBSERVER
 from maglev_controller.handover import ModelMaps, carry_over, check_retuning, model_maps
@@ -199,15 +199,15 @@ class Regulator:
 def _control_arrays(
     parameters: ControllerParameters, designs: Sequence[AxisDesign]
 ) -> ControlArrays:
-    states = max(1, *(design.model.order for design in designs))
+    states = max(1, *(design.order for design in designs))
     records = np.zeros(1, RECORDS)
     settings = _settings(parameters, designs)
     for name in SETTINGS.fields or ():
         records['settings'][name] = settings[name]
     models, transition = np.zeros((5, states), MODEL), np.zeros((5, states, states))
     for index, design in enumerate(designs):
-        n = design.model.order
-        models['output'][index, :n] = design.total_gain[2:]
+        n = design.order
+        models['output'][index, :n] = design.gain[2:]
         models['drive'][index, :n] = design.drive
         models['antiwindup'][index, :n] = design.antiwindup
         transition[index, :n, :n] = design.transition
@@ -225,11 +225,10 @@ def _settings(
     machine, limits = parameters.machine, parameters.limits
     margin = np.full(5, parameters.measurement.margin)
     margin[3:] /= machine.radius
-    gains = np.array([design.total_gain[:2] for design in designs])
+    gains = np.array([design.gain[:2] for design in designs])
     filters = np.array([design.derivative for design in designs])
     observers = np.array([design.observer for design in designs])
-    compensated = designs[0].model.form == 'compensator'
-    learned = np.full(5, math.inf) if compensated else parameters.internal_model.largest_error
+    limited = [design.limits_errors for design in designs]
     return {
         'machine': machine_to_array(machine_constants(machine)),
         'period': parameters.sample_time,
@@ -247,8 +246,8 @@ def _settings(
         'feed_forward': parameters.feed_forward,
         'error_gain': gains[:, 0],
         'rate_gain': gains[:, 1],
-        'error_limit': np.full(5, math.inf) if compensated else limits.error,
-        'learned_error': learned,
+        'error_limit': np.where(limited, limits.error, math.inf),
+        'learned_error': np.where(limited, parameters.internal_model.largest_error, math.inf),
         'filter_gain': filters[:, 0],
         'filter_forget': filters[:, 1],
         'observed': [design.observer != NO_OBSERVER for design in designs],

@@ -10,30 +10,23 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from maglev_controller.design.gains import AxisDesign
-from maglev_controller.design.internal_model import FloatArray, discretise
-from maglev_controller.design.observer import NO_OBSERVER
+from maglev_controller.design.axis_design import AxisDesign, controller_system
+from maglev_controller.design.state_space import (
+    ComplexArray,
+    StateSpace,
+    closed_loop,
+    plant_system,
+    response,
+)
 from maglev_controller.parameters import ControllerParameters, MarginParameters
+from maglev_model.axes import FloatArray
 from maglev_model.parameters import ParameterError
-
-ComplexArray = NDArray[np.complex128]
 
 _GRID = 1500  # frequencies looked at
 _SLOPES = 24  # slopes of friction looked at
-
-
-class Sampled(NamedTuple):
-    """x⁺ = A x + B u, y = C x + D u, one input, one output; shapes (n, n), (n,), (n,)."""
-
-    state: FloatArray
-    input: FloatArray
-    output: FloatArray
-    direct: float
 
 
 @dataclasses.dataclass(frozen=True)
@@ -90,84 +83,6 @@ def _decibel(factor: float) -> str:
     return f'{abs(20.0 * math.log10(factor)):.1f} dB' if 0.0 < factor < math.inf else 'any'
 
 
-def controller_system(design: AxisDesign, period: float, delay: int) -> Sampled:
-    """e to w as ``law.control_step`` computes it; ``delay`` is what the observer predicts over.
-
-    State (ξ, f) with the derivative filter; (ξ, predicted position and rate) with the observer, and
-    the w still to act with a delay.
-    """
-    n, gain = design.drive.size, design.total_gain
-    if design.observer == NO_OBSERVER:
-        rate, forget = design.derivative
-        state = np.zeros((n + 1, n + 1))
-        state[:n, :n], state[n, n] = design.transition, 1.0 - forget
-        return Sampled(
-            state,
-            np.append(design.drive, forget),
-            np.append(gain[2:], -gain[1] * rate),
-            float(gain[0] + gain[1] * rate),
-        )
-    step, push = np.array([[1.0, period], [0.0, 1.0]]), np.array([0.5 * period**2, period])
-    correction = np.array(design.observer)
-    size = n + 2 + (delay > 0)
-    seen, read = np.zeros((2, size)), correction
-    seen[:, n : n + 2] = np.eye(2) - np.outer(correction, [1.0, 0.0])
-    after, after_read = step @ seen, step @ read  # but for what acts
-    used, used_read = seen, read
-    if delay:
-        after[:, n + 2] = push
-        used, used_read = after, after_read
-    output, direct = gain[:2] @ used, float(gain[:2] @ used_read)
-    output[:n] += gain[2:]
-    state, drive = np.zeros((size, size)), np.zeros(size)
-    state[:n, :n], drive[:n] = design.transition, design.drive
-    state[n : n + 2], drive[n : n + 2] = after, after_read
-    if delay:
-        state[n + 2], drive[n + 2] = output, direct
-    else:
-        state[n : n + 2] += np.outer(push, output)
-        drive[n : n + 2] += push * direct
-    return Sampled(state, drive, output, direct)
-
-
-def plant_system(
-    period: float, delay: int = 0, *, stiffness: float = 0.0, friction: float = 0.0
-) -> Sampled:
-    """w to e: ë = α e − κ ė + w, held; ``stiffness`` α [1/s²], ``friction`` κ [1/s]."""
-    moved, pushed = discretise(
-        np.array([[0.0, 1.0], [stiffness, -friction]]), np.array([[0.0], [1.0]]), period
-    )
-    size = 2 + delay
-    state, drive = np.zeros((size, size)), np.zeros(size)
-    state[:2, :2] = moved
-    if delay == 0:
-        drive[:] = pushed[:, 0]
-    else:
-        state[:2, 2], drive[-1] = pushed[:, 0], 1.0
-        state[2:-1, 3:] = np.eye(delay - 1)
-    return Sampled(state, drive, np.eye(1, size)[0], 0.0)
-
-
-def closed_loop(controller: Sampled, plant: Sampled) -> FloatArray:
-    """The closed loop's transition matrix; state: the plant's, then the controller's."""
-    n = plant.input.size
-    loop = np.zeros((n + controller.input.size,) * 2)
-    loop[:n, :n] = plant.state + controller.direct * np.outer(plant.input, plant.output)
-    loop[:n, n:] = np.outer(plant.input, controller.output)
-    loop[n:, :n] = np.outer(controller.input, plant.output)
-    loop[n:, n:] = controller.state
-    return loop
-
-
-def response(system: Sampled, z: ComplexArray) -> ComplexArray:
-    """Frequency response at ``z`` (m,)."""
-    unit = np.eye(system.input.size)
-    columns = np.linalg.solve(
-        z[:, None, None] * unit - system.state, system.input.astype(np.complex128)[:, None]
-    )
-    return np.asarray(columns[:, :, 0] @ system.output + system.direct)
-
-
 def loop_margins(
     design: AxisDesign, period: float, *, delay: int = 0, designed: int = 0, slope: float = 0.0
 ) -> LoopMargins:
@@ -220,7 +135,7 @@ def _gain_margins(loop: ComplexArray) -> tuple[float, float]:
 
 
 def _friction(
-    controller: Sampled, design: AxisDesign, timing: tuple[float, int], slope: float
+    controller: StateSpace, design: AxisDesign, timing: tuple[float, int], slope: float
 ) -> float:
     """The slope up to which every slope leaves the loop stable; ``timing``: sample time, delay."""
     reached = 0.0
@@ -239,24 +154,25 @@ def all_margins(
     parameters: ControllerParameters, designs: Sequence[AxisDesign]
 ) -> tuple[LoopMargins, ...]:
     """The margins of all axes; of axes designed alike only once."""
-    known: dict[tuple[bytes, float], LoopMargins] = {}
-    keys = [(design.total_gain.tobytes(), design.stiffness) for design in designs]
+    slope, delay = parameters.internal_model.friction_slope, parameters.input_delay
+    known: dict[object, LoopMargins] = {}
+    keys = [_key(design) for design in designs]
     for key, design in zip(keys, designs, strict=True):
         if key not in known:
-            known[key] = _margins_of(parameters, design)
+            known[key] = loop_margins(
+                design,
+                parameters.sample_time,
+                delay=delay,
+                designed=delay,
+                slope=slope if design.can_hunt else 0.0,
+            )
     return tuple(known[key] for key in keys)
 
 
-def _margins_of(parameters: ControllerParameters, design: AxisDesign) -> LoopMargins:
-    """The margins of one axis with the delay and the friction its parameters tell."""
-    own = parameters.internal_model
-    return loop_margins(
-        design,
-        parameters.sample_time,
-        delay=parameters.input_delay,
-        designed=parameters.input_delay,
-        slope=0.0 if design.model.form == 'compensator' else own.friction_slope,
-    )
+def _key(design: AxisDesign) -> object:
+    """All that the margins depend on."""
+    arrays = tuple(array.tobytes() for array in (design.gain, design.transition, design.drive))
+    return arrays, design.derivative, design.observer, design.stiffness, design.can_hunt
 
 
 def check_margins(parameters: ControllerParameters, found: LoopMargins, axis: str) -> None:
