@@ -85,7 +85,7 @@ class AxisParameters:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class InternalModelParameters:
+class RegulatorModelParameters:
     """What the internal models of all axes share."""
 
     form: str = parameter(
@@ -288,7 +288,7 @@ class MeasurementParameters:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class LandingParameters:
+class OwnLandingParameters:
     """The descent the controller makes by itself when the reference is lost."""
 
     braking_time: float = parameter(
@@ -325,7 +325,7 @@ class ControllerParameters:
         ' equilibrium: constant gains, by linearisation (jacobian_lead_lag)',
     )
     feed_forward: bool = parameter(True, description='add the acceleration of the reference to w')
-    internal_model: InternalModelParameters = group(InternalModelParameters)
+    internal_model: RegulatorModelParameters = group(RegulatorModelParameters)
     compensator: CompensatorParameters = group(CompensatorParameters)
     rate_estimate: str = parameter(
         'observer',
@@ -349,7 +349,7 @@ class ControllerParameters:
     jumps: JumpParameters = group(JumpParameters)
     limits: LimitParameters = group(LimitParameters)
     measurement: MeasurementParameters = group(MeasurementParameters)
-    landing: LandingParameters = group(LandingParameters)
+    landing: OwnLandingParameters = group(OwnLandingParameters)
     machine: MachineParameters = group(MachineParameters)
 
     @property

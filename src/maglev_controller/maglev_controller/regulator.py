@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from maglev_controller.bumpless_transfer import ModelMaps, carry_over, check_retuning, model_maps
 from maglev_controller.design.axis_design import AxisDesign
 from maglev_controller.design.margins import LoopMargins, all_margins, check_margins
 from maglev_controller.design.observer import NO_OBSERVER
-from maglev_controller.handover import ModelMaps, carry_over, check_retuning, model_maps
 from maglev_controller.laws import control_law
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.sample_step import (
@@ -36,13 +36,11 @@ from maglev_controller.sample_step import (
     ControlArrays,
     answer_sample,
 )
-from maglev_model.axes import AXES
+from maglev_model.axes import AXES, FloatArray
 from maglev_model.machine import machine_constants, machine_to_array
 
-FloatArray = NDArray[np.float64]
-
 FADING_TIME = 0.05
-"""Time constant of the share of w that bridges a change of gains in flight [s]."""
+"""Time constant of the bump, the part of w that bridges a change of gains in flight [s]."""
 
 
 class MeasurementFault(ValueError):  # noqa: N818
@@ -53,20 +51,18 @@ class Regulator:
     """The regulator of all five axes; arrays in the paper's output order y, x, z, phi, theta.
 
     Readable after a step, (5,) each, in place: ``position`` [m, rad], ``error``, ``error_rate``,
-    ``virtual_input`` w [m/s², rad/s²] and ``internal_model``, the internal model's share of w.
+    ``virtual_input`` w [m/s², rad/s²] and ``internal_model``, the internal model's part of w.
     """
 
     def __init__(self, parameters: ControllerParameters) -> None:
         """Design all axes. Raises ``ParameterError`` with the reason for what cannot be had."""
         self.parameters = parameters
-        chosen = control_law(parameters)
-        self.designs: tuple[AxisDesign, ...] = tuple(
-            chosen.design(parameters, name) for name in AXES
-        )
+        law = control_law(parameters)
+        self.designs: tuple[AxisDesign, ...] = tuple(law.design(parameters, name) for name in AXES)
         self.margins: tuple[LoopMargins, ...] = all_margins(parameters, self.designs)
-        for name, found, own in zip(AXES, self.margins, parameters.axes, strict=True):
-            if own.controlled:
-                check_margins(parameters, found, name)
+        for name, margins, axis in zip(AXES, self.margins, parameters.axes, strict=True):
+            if axis.controlled:
+                check_margins(parameters, margins, name)
         self._use(_control_arrays(parameters, self.designs))
         self.reset()
 
@@ -96,7 +92,7 @@ class Regulator:
     def describe_loops(self) -> list[str]:
         """Margins and poles of the sampled closed loop, one line for each axis under control."""
         axes = zip(AXES, self.margins, self.parameters.axes, strict=True)
-        return [found.text(name) for name, found, own in axes if own.controlled]
+        return [margins.text(name) for name, margins, axis in axes if axis.controlled]
 
     def retuned(self, parameters: ControllerParameters) -> Regulator:
         """A regulator with other parameters that goes on in flight where this one is.
@@ -112,8 +108,8 @@ class Regulator:
     def take_over(self, previous: Regulator, maps: ModelMaps | None = None) -> None:
         """Go on where ``previous`` is, without a jump of w; both designed for the same stage.
 
-        With ``maps``, which :func:`maglev_controller.handover.model_maps` makes of the two, it is
-        done within a fraction of a sample.
+        With ``maps``, which :func:`~maglev_controller.bumpless_transfer.model_maps` makes of the
+        two, it is done within a fraction of a sample.
         """
         if maps is None:
             maps = model_maps(previous.arrays, self._arrays)

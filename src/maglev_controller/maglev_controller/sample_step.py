@@ -13,6 +13,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
 from maglev_model.equilibrium import equilibrium_inverse
 from maglev_model.inverse import CurrentLimits, exact_inverse, simplified_inverse
@@ -20,7 +21,6 @@ from maglev_model.machine import Machine, machine_from_array
 from maglev_model.platen import outputs_from_gaps
 from maglev_model.quintic import quintic_to_zero, transition_time
 
-FloatArray = NDArray[np.float64]
 Record = Any
 """An element of an array of records, whose fields compiled code reads and writes as attributes."""
 

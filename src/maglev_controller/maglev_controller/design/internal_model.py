@@ -20,7 +20,7 @@ from maglev_model.parameters import ParameterError
 
 @dataclasses.dataclass(frozen=True)
 class InternalModel:
-    """ξ̇ = Φ ξ + N e, share of w = Γ ξ, equation (14).
+    """ξ̇ = Φ ξ + N e, part of w = Γ ξ, equation (14).
 
     ``frequencies`` (m,) in rad/s, ascending, 0 for the integrator; ``state`` Φ (n, n), ``input`` N
     (n,), ``output`` Γ (n,). A frequency above 0 takes two states, so n = 2 m, less 1 with the

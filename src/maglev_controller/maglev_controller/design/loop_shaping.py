@@ -1,6 +1,6 @@
 """Loop shaping of one axis as it runs sampled: compensators from e to w with an integrator.
 
-A shape ``C(s) = K (1 + ω_i / s) F(s)`` has one figure left open, found here such that the sampled
+A shape ``C(s) = K (1 + ω_i / s) F(s)`` has one figure left open, set here such that the sampled
 loop with the plant ``1 / (s² - α)`` has the wanted phase margin at the wanted crossover. All is
 computed as it runs: the compensator sampled by Tustin's rule, the plant exactly, with w held.
 """
@@ -109,5 +109,5 @@ def _fit(
     ratio = float(ratios[first])
     if first > 0:
         ratio = float(brentq(missing, ratios[first - 1], ratios[first], xtol=1e-9))
-    found, gain = tustin(shape(figures, crossover, ratio), period), 1.0 / abs(loop_gain(ratio))
-    return found._replace(output=gain * found.output, direct=gain * found.direct)
+    unit, gain = tustin(shape(figures, crossover, ratio), period), 1.0 / abs(loop_gain(ratio))
+    return unit._replace(output=gain * unit.output, direct=gain * unit.direct)

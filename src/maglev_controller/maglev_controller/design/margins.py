@@ -31,7 +31,7 @@ _SLOPES = 24  # slopes of friction looked at
 
 @dataclasses.dataclass(frozen=True)
 class LoopMargins:
-    """What :func:`loop_margins` found.
+    """Poles and margins of one axis, as :func:`loop_margins` computes them.
 
     ``poles`` (m,) of the sampled closed loop, z; ``crossover`` [rad/s], the highest; ``phase``
     margin [deg], the smallest at any crossover; gain margins as factors, ``gain_up`` (inf for
@@ -58,8 +58,8 @@ class LoopMargins:
     @property
     def natural_poles(self) -> ComplexArray:
         """The poles as ln z / T [rad/s], the slowest first, of a pair the upper; fast ones too."""
-        found = np.log(self.poles.astype(np.complex128) + 0.0) / self.period
-        upper = found[found.imag >= -1e-9]
+        poles = np.log(self.poles.astype(np.complex128) + 0.0) / self.period
+        upper = poles[poles.imag >= -1e-9]
         return np.asarray(upper[np.argsort(-upper.real)])
 
     def text(self, axis: str) -> str:
@@ -117,9 +117,9 @@ def _crossover(omega: FloatArray, loop: ComplexArray) -> tuple[float, float]:
     k = np.nonzero(np.sign(size[:-1]) != np.sign(size[1:]))[0]
     if k.size == 0:
         return 0.0, 180.0
-    share = size[k] / (size[k] - size[k + 1])
-    at = loop[k] * (loop[k + 1] / loop[k]) ** share
-    crossovers = omega[k] * (omega[k + 1] / omega[k]) ** share
+    part = size[k] / (size[k] - size[k + 1])
+    at = loop[k] * (loop[k + 1] / loop[k]) ** part
+    crossovers = omega[k] * (omega[k + 1] / omega[k]) ** part
     return float(crossovers[-1]), float(np.min(np.abs(np.degrees(np.angle(-at)))))
 
 
@@ -127,8 +127,8 @@ def _gain_margins(loop: ComplexArray) -> tuple[float, float]:
     """Smallest factor above 1, and largest below, that puts ``loop`` on −1."""
     before, after = loop[:-1], loop[1:]
     crossing = (np.sign(before.imag) != np.sign(after.imag)) & (before.real < 0.0)
-    share = before.imag[crossing] / (before.imag - after.imag)[crossing]
-    real = before.real[crossing] + share * (after.real - before.real)[crossing]
+    part = before.imag[crossing] / (before.imag - after.imag)[crossing]
+    real = before.real[crossing] + part * (after.real - before.real)[crossing]
     factors = -1.0 / real[real < 0.0]
     up, down = factors[factors > 1.0], factors[factors < 1.0]
     return float(np.min(up, initial=math.inf)), float(np.max(down, initial=0.0))
@@ -175,46 +175,46 @@ def _key(design: AxisDesign) -> object:
     return arrays, design.derivative, design.observer, design.stiffness, design.can_hunt
 
 
-def check_margins(parameters: ControllerParameters, found: LoopMargins, axis: str) -> None:
+def check_margins(parameters: ControllerParameters, margins: LoopMargins, axis: str) -> None:
     """Refuse a loop that is unstable, or short of the least margins unless they are overridden.
 
     Raises :class:`ParameterError`, naming the axis, the figure and what would help.
     """
-    if not found.spectral_radius < 1.0:
-        worst = found.poles[np.argmax(np.abs(found.poles))]
+    if not margins.spectral_radius < 1.0:
+        worst = margins.poles[np.argmax(np.abs(margins.poles))]
         raise ParameterError(
             f'{axis}: with these gains and this rate estimate the loop is unstable at a sample '
-            f'time of {found.period:g} s (largest pole |z| = {found.spectral_radius:.4f} at '
-            f'{abs(np.angle(worst)) / found.period:.4g} rad/s)'
+            f'time of {margins.period:g} s (largest pole |z| = {margins.spectral_radius:.4f} at '
+            f'{abs(np.angle(worst)) / margins.period:.4g} rad/s)'
         )
     if parameters.margins.override:
         return
-    short = _shortfall(parameters.margins, found)
+    short = _shortfall(parameters.margins, margins)
     if short:
         raise ParameterError(
             f'{axis}: {short}; make the axis slower (its poles or LQR weights), '
             "or take it as it is with 'margins.override'"
         )
-    slope = found.wanted_slope
-    if found.friction_slope < 0.999 * slope:
+    slope = margins.wanted_slope
+    if margins.friction_slope < 0.999 * slope:
         raise ParameterError(
-            f'{axis}: standing still hunts with friction steeper than {found.friction_slope:.0f} '
+            f'{axis}: standing still hunts with friction steeper than {margins.friction_slope:.0f} '
             f"1/s, 'internal_model.friction_slope' asks for {slope:g}; make the axis faster or its "
             'internal model slower (weight_model), or ask for less'
         )
 
 
-def _shortfall(least: MarginParameters, found: LoopMargins) -> str:
-    if found.phase < least.phase:
+def _shortfall(least: MarginParameters, margins: LoopMargins) -> str:
+    if margins.phase < least.phase:
         return (
-            f"the phase margin is {found.phase:.1f} deg, 'margins.phase' asks for {least.phase:g}"
+            f"the phase margin is {margins.phase:.1f} deg, 'margins.phase' asks for {least.phase:g}"
         )
-    gain = min(found.gain_up, 1.0 / found.gain_down if found.gain_down > 0.0 else math.inf)
+    gain = min(margins.gain_up, 1.0 / margins.gain_down if margins.gain_down > 0.0 else math.inf)
     if gain < least.gain:
         return f"the gain margin is a factor {gain:.2f}, 'margins.gain' asks for {least.gain:g}"
-    if found.sensitivity > least.sensitivity:
+    if margins.sensitivity > least.sensitivity:
         return (
-            f"the sensitivity peaks at {found.sensitivity:.2f}, 'margins.sensitivity' allows "
+            f"the sensitivity peaks at {margins.sensitivity:.2f}, 'margins.sensitivity' allows "
             f'{least.sensitivity:g}'
         )
     return ''

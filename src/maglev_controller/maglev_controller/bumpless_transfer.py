@@ -1,4 +1,7 @@
-"""Other gains in flight: what may change there, and how the new regulator goes on from the old."""
+"""Bumpless transfer: how a regulator takes over from another in flight, without a jump of w.
+
+And what cannot change in flight.
+"""
 
 from __future__ import annotations
 
@@ -95,8 +98,8 @@ def _model_map(old: ControlArrays, new: ControlArrays, axis: int) -> FloatArray:
     outputs = _outputs(new, axis)
     scale = np.max(np.abs(outputs), axis=0)
     scale[scale == 0.0] = 1.0
-    found: FloatArray = np.linalg.pinv(outputs / scale, rcond=1e-10) @ _outputs(old, axis)
-    return np.asarray(found / scale[:, None])
+    scaled: FloatArray = np.linalg.pinv(outputs / scale, rcond=1e-10) @ _outputs(old, axis)
+    return np.asarray(scaled / scale[:, None])
 
 
 def _outputs(arrays: ControlArrays, axis: int) -> FloatArray:
