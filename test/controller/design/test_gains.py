@@ -13,6 +13,7 @@ from maglev_controller.design.gains import (
     Weights,
     augmented,
     augmented_discrete,
+    bandwidth_weights,
     closed_loop_poles,
     dlqr,
     lqr,
@@ -145,6 +146,27 @@ def test_the_default_gain_is_python_controls() -> None:
     np.testing.assert_allclose(feedback(design)[:3], wanted[:3], rtol=1e-5)
 
 
+def test_three_numbers_stand_for_the_weights() -> None:
+    """The gain of the design 'bandwidth' is that of its weights given one by one."""
+    three = axis_parameters(design='bandwidth', bandwidth=150.0, integration=60.0, learning=5.0)
+    weights = axis_parameters(
+        design='lqr_discrete',
+        weight_error=150.0**4,
+        weight_rate=2.0 * 150.0**2,
+        weight_model=(150.0**4 * 60.0**2, 150.0**4 * 5.0**2),
+        weight_effort=1.0,
+    )
+    np.testing.assert_array_equal(design_axis(three, 'y').gain, design_axis(weights, 'y').gain)
+
+
+@pytest.mark.parametrize('bandwidth', [20.0, 200.0])
+def test_bandwidth_is_where_the_poles_are(bandwidth: float) -> None:
+    """Without an internal model both continuous poles are at -W."""
+    model = internal_model([], 'modal')
+    poles = closed_loop_poles(model, lqr(model, bandwidth_weights(bandwidth, 90.0, 10.0)))
+    np.testing.assert_allclose(poles, -bandwidth, rtol=1e-6)
+
+
 @pytest.mark.parametrize('slope', [300.0, 1500.0, 1e9])
 def test_split_phase_turns_every_oscillator_half_the_way(slope: float) -> None:
     """By the residue at its pole, against the axis' answer with and without the friction."""
@@ -220,6 +242,7 @@ def test_antiwindup_observer_lets_go_and_does_not_ring() -> None:
         ),
         ({'weight_model': (0.0,)}, "y: .* 'weight_model' must be above 0"),
         ({'weight_model': (1.0, 2.0, 3.0)}, "y: 'weight_model' has 3 elements.* 1, 2 or 6"),
+        ({'design': 'bandwidth', 'internal_model__form': 'companion'}, "'companion' does not tell"),
         ({'antiwindup': (1.0, 2.0)}, "y: 'antiwindup' has 2 elements"),
         ({'internal_model__fundamental': 900.0}, 'more than half of what a sample time'),
     ],

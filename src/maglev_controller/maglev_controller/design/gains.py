@@ -32,6 +32,21 @@ class Weights:
     effort: float
 
 
+def bandwidth_weights(bandwidth: float, integration: float, learning: float) -> Weights:
+    """The weights that three speeds stand for [rad/s]: W⁴, 2 W², W⁴ i² and W⁴ m², effort 1.
+
+    Without an internal model they put two poles at −W. An integral of e weighs as
+    much as e itself after 1 / i, what an oscillator has gathered after 1 / m.
+    """
+    fourth = bandwidth**4
+    return Weights(
+        error=fourth,
+        rate=2.0 * bandwidth**2,
+        model=(fourth * integration**2, fourth * learning**2),
+        effort=1.0,
+    )
+
+
 def augmented(model: InternalModel) -> tuple[FloatArray, FloatArray]:
     """The axis with its internal model: state (e, ė, ξ), input the K part of w in (16).
 

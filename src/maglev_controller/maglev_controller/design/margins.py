@@ -192,7 +192,7 @@ def check_margins(parameters: ControllerParameters, margins: LoopMargins, axis: 
     short = _shortfall(parameters.margins, margins)
     if short:
         raise ParameterError(
-            f'{axis}: {short}; make the axis slower (its poles or LQR weights), '
+            f'{axis}: {short}; make the axis slower (its bandwidth, LQR weights or poles), '
             "or take it as it is with 'margins.override'"
         )
     slope = margins.wanted_slope
@@ -200,7 +200,7 @@ def check_margins(parameters: ControllerParameters, margins: LoopMargins, axis: 
         raise ParameterError(
             f'{axis}: standing still hunts with friction steeper than {margins.friction_slope:.0f} '
             f"1/s, 'internal_model.friction_slope' asks for {slope:g}; make the axis faster or its "
-            'internal model slower (weight_model), or ask for less'
+            'internal model slower (its learning or weight_model), or ask for less'
         )
 
 

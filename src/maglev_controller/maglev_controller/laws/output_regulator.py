@@ -11,7 +11,15 @@ import numpy as np
 from maglev_controller.checks import check_inverse
 from maglev_controller.design.axis_design import AxisDesign, following_gain
 from maglev_controller.design.derivative import derivative_filter
-from maglev_controller.design.gains import Weights, dlqr, lqr, place, poles_from, split_phase
+from maglev_controller.design.gains import (
+    Weights,
+    bandwidth_weights,
+    dlqr,
+    lqr,
+    place,
+    poles_from,
+    split_phase,
+)
 from maglev_controller.design.internal_model import InternalModel, internal_model
 from maglev_controller.design.observer import NO_OBSERVER, observer
 from maglev_controller.design.state_space import discretise
@@ -78,12 +86,23 @@ def _gain(chosen: AxisParameters, model: InternalModel, period: float, axis: str
     """K of (16)."""
     if chosen.design == 'poles':
         return place(model, poles_from(chosen.poles_real, chosen.poles_imaginary, axis), axis)
-    weights = Weights(
-        chosen.weight_error, chosen.weight_rate, chosen.weight_model, chosen.weight_effort
-    )
+    weights = _weights(chosen, model, axis)
     if chosen.design == 'lqr_continuous':
         return lqr(model, weights, axis)
     return dlqr(model, weights, period, axis)
+
+
+def _weights(chosen: AxisParameters, model: InternalModel, axis: str) -> Weights:
+    if chosen.design != 'bandwidth':
+        return Weights(
+            chosen.weight_error, chosen.weight_rate, chosen.weight_model, chosen.weight_effort
+        )
+    if model.form != 'modal':
+        raise ParameterError(
+            f"{axis}: the design 'bandwidth' weighs integrator and oscillators, which an "
+            f"'internal_model.form' of '{model.form}' does not tell apart: it takes 'modal'"
+        )
+    return bandwidth_weights(chosen.bandwidth, chosen.integration, chosen.learning)
 
 
 def _paper_antiwindup(chosen: AxisParameters, model: InternalModel, axis: str) -> FloatArray:
