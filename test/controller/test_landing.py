@@ -30,15 +30,15 @@ def way(position: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) ->
 @given(
     share=st.lists(st.floats(0.1, 0.9), min_size=5, max_size=5),
     speed=st.lists(st.floats(-1.0, 1.0), min_size=5, max_size=5),
-    bend=st.lists(st.floats(-1.0, 1.0), min_size=5, max_size=5),
+    push=st.lists(st.floats(-1.0, 1.0), min_size=5, max_size=5),
 )
 def test_from_any_reference_smoothly_to_the_stop(
-    share: list[float], speed: list[float], bend: list[float]
+    share: list[float], speed: list[float], push: list[float]
 ) -> None:
     """Continuous in position and velocity, within the stops, tilts level, at rest at 31 mm."""
     position = LOWER + np.array(share) * (UPPER - LOWER)
     velocity = np.array(speed) * [0.02, 0.1, 0.1, 0.004, 0.03]
-    rows = way(position, velocity, np.array(bend) * [0.1, 0.6, 0.6, 0.01, 0.2])
+    rows = way(position, velocity, np.array(push) * [0.1, 0.6, 0.6, 0.01, 0.2])
     path, rate = rows[:, 0], rows[:, 1]
     steps = np.diff(path, axis=0) - 0.5e-3 * (rate[1:] + rate[:-1])
     assert np.abs(steps).max() < 1e-6

@@ -103,9 +103,11 @@ def test_exact_inverse_makes_the_loop_linear() -> None:
     """On the ideal plant a vertical step is the linear closed loop's, by python-control."""
     reg = regulator('paper.yaml', 'paper_exact.yaml')
     design = reg.designs[Y]
+    assert design.model is not None
     state, drive = augmented(design.model)
+    feedback = design.gain - np.array([0.0, 0.0, *design.model.output])  # Γ ξ is in the state
     closed = control.ss(
-        state + np.outer(drive, design.gain), np.zeros((5, 1)), np.eye(1, 5), np.zeros((1, 1))
+        state + np.outer(drive, feedback), np.zeros((5, 1)), np.eye(1, 5), np.zeros((1, 1))
     )
     time = PERIOD * np.arange(4000)
     for start, end in ((0.020, 0.027), (0.027, 0.022)):

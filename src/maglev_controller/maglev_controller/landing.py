@@ -8,16 +8,10 @@ current there.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from maglev_controller.parameters import ControllerParameters
-from maglev_model.axes import AXES
-from maglev_model.quintic import quintic_to_zero
-
-FloatArray = NDArray[np.float64]
-
-LEAST_BRAKING = 0.05
-"""Shortest time an axis brakes in [s], however near a stop is."""
+from maglev_model.axes import AXES, FloatArray
+from maglev_model.quintic import braking_times, quintic_to_zero
 
 
 class Landing:
@@ -46,17 +40,10 @@ class Landing:
         self._start = np.clip(np.asarray(position, dtype=np.float64), lower, upper)
         self._velocity = np.array(velocity, dtype=np.float64)
         self._acceleration = np.array(acceleration, dtype=np.float64)
-        self._brakes = self._braking_times(lower, upper)
+        self._brakes = braking_times(self._start, self._velocity, lower, upper, self._braking)
         self._level = self._resting_place(lower, upper)
         self._elapsed = 0.0
         self.done = False
-
-    def _braking_times(self, lower: FloatArray, upper: FloatArray) -> FloatArray:
-        """How long each axis brakes (5,) [s]: less where a stop is near."""
-        room = np.where(self._velocity > 0.0, upper - self._start, self._start - lower)
-        speed = np.maximum(np.abs(self._velocity), 1e-9)
-        times: FloatArray = np.clip(1.5 * room / speed, LEAST_BRAKING, self._braking)
-        return times
 
     def _resting_place(self, lower: FloatArray, upper: FloatArray) -> FloatArray:
         """Where braking ends: halfway what the velocity would cover, off the stops, tilts level."""
@@ -74,15 +61,15 @@ class Landing:
         position, velocity, acceleration = self._level.copy(), np.zeros(5), np.zeros(5)
         if self._elapsed < self._braking:
             for axis in range(5):
-                offset, rate, bend = quintic_to_zero(
+                to_position, to_velocity, to_acceleration = quintic_to_zero(
                     self._start[axis] - self._level[axis],
                     self._velocity[axis],
                     self._acceleration[axis],
                     self._brakes[axis],
                     self._elapsed,
                 )
-                position[axis] += offset
-                velocity[axis], acceleration[axis] = rate, bend
+                position[axis] += to_position
+                velocity[axis], acceleration[axis] = to_velocity, to_acceleration
             return position, velocity, acceleration
         offset, velocity[0], acceleration[0] = quintic_to_zero(
             self._level[0] - self._floor, 0.0, 0.0, self._descent, self._elapsed - self._braking

@@ -237,11 +237,11 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         """Redesign in another process, serving the loop, and change over between two samples."""
         law = self._law(parameters)
         if law != self.supervisor.parameters:
-            redesign = self.supervisor.redesign(law)
-            while not redesign.done:
+            design = self.supervisor.redesign(law)
+            while not design.done:
                 self._serve_by_hand()
                 time.sleep(_HAND_PERIOD)
-            self.supervisor.adopt(*redesign.result())
+            self.supervisor.adopt(*design.result())
         self._longest_gap = parameters.measurement_timeout / parameters.sample_time
 
     @staticmethod

@@ -6,22 +6,10 @@ The defaults are the best regulator there is here; ``params/paper.yaml`` turns i
 from __future__ import annotations
 
 import dataclasses
-import math
 
+from maglev_model.loop_parameters import AxisLoopParameters, FundamentalParameters
 from maglev_model.machine import MachineParameters
 from maglev_model.parameters import group, parameter
-
-LAWS = (
-    'output_regulator',
-    'jacobian_lead_lag',
-    'feedback_lead_lag',
-    'feedback_soi',
-    'regulator_3dof',
-)
-"""Names of the control laws, each a file of :mod:`maglev_controller.laws`."""
-
-REFERENCE_FREQUENCY = 1.5 * math.pi
-"""ω0 of the paper's sinusoids [rad/s]."""
 
 _UPPER_POLES = (
     (-127.1, 77.51),
@@ -37,23 +25,18 @@ POLES_IMAGINARY = (0.0, *(sign * part for _, part in _UPPER_POLES for sign in (1
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class AxisParameters:
+class AxisParameters(AxisLoopParameters):
     """Internal model and gains of one axis."""
 
     controlled: bool = parameter(
         True,
         description='whether the axis gets control; off: v_phi = v_theta = 0 as in the paper',
     )
-    multiples: tuple[float, ...] = parameter(
-        (0.0, 1.0, 2.0, 3.0, 4.0, 5.0),
-        lower=0.0,
-        upper=100.0,
-        description='frequencies of the internal model, as multiples of its fundamental',
-    )
     design: str = parameter(
         'lqr_discrete',
-        choices=('poles', 'lqr_continuous', 'lqr_discrete'),
-        description='gains from closed-loop poles or from LQR weights',
+        choices=('bandwidth', 'lqr_discrete', 'lqr_continuous', 'poles'),
+        description='gains by discrete LQR with the weights that bandwidth, integration and '
+        'learning stand for; by LQR with the weights weight_*; or from closed-loop poles',
     )
     poles_real: tuple[float, ...] = parameter(
         POLES_REAL,
@@ -94,20 +77,13 @@ class AxisParameters:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class InternalModelParameters:
+class RegulatorModelParameters(FundamentalParameters):
     """What the internal models of all axes share."""
 
     form: str = parameter(
         'modal',
         choices=('modal', 'companion'),
         description='realisation: companion is (15) to the letter, modal is for many frequencies',
-    )
-    fundamental: float = parameter(
-        REFERENCE_FREQUENCY,
-        unit='rad/s',
-        lower=1e-3,
-        upper=1e3,
-        description='frequency of the reference, omega_0',
     )
     friction_slope: float = parameter(
         1500.0,
@@ -297,7 +273,7 @@ class MeasurementParameters:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class LandingParameters:
+class OwnLandingParameters:
     """The descent the controller makes by itself when the reference is lost."""
 
     braking_time: float = parameter(
@@ -324,8 +300,8 @@ class ControllerParameters:
     )
     law: str = parameter(
         'output_regulator',
-        choices=LAWS,
-        description='control law: how e becomes w; maglev_controller.laws tells what each is',
+        description='control law, how e becomes w: a module of maglev_controller.laws by its name, '
+        'or any other by its dotted path',
     )
     inverse: str = parameter(
         'exact',
@@ -334,7 +310,7 @@ class ControllerParameters:
         ' equilibrium: constant gains, by linearisation (jacobian_lead_lag)',
     )
     feed_forward: bool = parameter(True, description='add the acceleration of the reference to w')
-    internal_model: InternalModelParameters = group(InternalModelParameters)
+    internal_model: RegulatorModelParameters = group(RegulatorModelParameters)
     compensator: CompensatorParameters = group(CompensatorParameters)
     rate_estimate: str = parameter(
         'observer',
@@ -358,7 +334,7 @@ class ControllerParameters:
     jumps: JumpParameters = group(JumpParameters)
     limits: LimitParameters = group(LimitParameters)
     measurement: MeasurementParameters = group(MeasurementParameters)
-    landing: LandingParameters = group(LandingParameters)
+    landing: OwnLandingParameters = group(OwnLandingParameters)
     machine: MachineParameters = group(MachineParameters)
 
     @property

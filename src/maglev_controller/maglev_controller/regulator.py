@@ -10,26 +10,37 @@ kick. With feed-forward, w also holds the reference's acceleration.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from maglev_controller import sample_step as law
-from maglev_controller.design.gains import AxisDesign
+from maglev_controller.bumpless_transfer import ModelMaps, carry_over, check_retuning, model_maps
+from maglev_controller.design.axis_design import AxisDesign
 from maglev_controller.design.margins import LoopMargins, all_margins, check_margins
 from maglev_controller.design.observer import NO_OBSERVER
-from maglev_controller.handover import ModelMaps, carry_over, check_retuning, model_maps
 from maglev_controller.laws import control_law
 from maglev_controller.parameters import ControllerParameters
-from maglev_controller.sample_step import ControlArrays, control_step
-from maglev_model.axes import AXES
+from maglev_controller.sample_step import (
+    AXIS,
+    BAD_REFERENCE,
+    INVERSES,
+    MODEL,
+    NOT_FINITE,
+    RECORDS,
+    SAMPLE,
+    SATURATED,
+    SETTINGS,
+    WARPED,
+    ControlArrays,
+    answer_sample,
+)
+from maglev_model.axes import AXES, FloatArray
 from maglev_model.machine import machine_constants, machine_to_array
 
-FloatArray = NDArray[np.float64]
-
 FADING_TIME = 0.05
-"""Time constant of the share of w that bridges a change of gains in flight [s]."""
+"""Time constant of the bump, the part of w that bridges a change of gains in flight [s]."""
 
 
 class MeasurementFault(ValueError):  # noqa: N818
@@ -40,31 +51,29 @@ class Regulator:
     """The regulator of all five axes; arrays in the paper's output order y, x, z, phi, theta.
 
     Readable after a step, (5,) each, in place: ``position`` [m, rad], ``error``, ``error_rate``,
-    ``virtual_input`` w [m/s², rad/s²] and ``internal_model``, the internal model's share of w.
+    ``virtual_input`` w [m/s², rad/s²] and ``internal_model``, the internal model's part of w.
     """
 
     def __init__(self, parameters: ControllerParameters) -> None:
         """Design all axes. Raises ``ParameterError`` with the reason for what cannot be had."""
         self.parameters = parameters
-        chosen = control_law(parameters)
-        self.designs: tuple[AxisDesign, ...] = tuple(
-            chosen.design(parameters, name) for name in AXES
-        )
+        law = control_law(parameters)
+        self.designs: tuple[AxisDesign, ...] = tuple(law.design(parameters, name) for name in AXES)
         self.margins: tuple[LoopMargins, ...] = all_margins(parameters, self.designs)
-        for name, found, own in zip(AXES, self.margins, parameters.axes, strict=True):
-            if own.controlled:
-                check_margins(parameters, found, name)
+        for name, margins, axis in zip(AXES, self.margins, parameters.axes, strict=True):
+            if axis.controlled:
+                check_margins(parameters, margins, name)
         self._use(_control_arrays(parameters, self.designs))
         self.reset()
 
     def _use(self, arrays: ControlArrays) -> None:
         self._arrays = arrays
-        telemetry = arrays.telemetry
-        self.position = telemetry[law.POSITION]
-        self.error = telemetry[law.ERROR]
-        self.error_rate = telemetry[law.ERROR_RATE]
-        self.virtual_input = telemetry[law.VIRTUAL_INPUT]
-        self.internal_model = telemetry[law.INTERNAL_MODEL]
+        sample = arrays.sample
+        self.position: FloatArray = sample['position']
+        self.error: FloatArray = sample['error']
+        self.error_rate: FloatArray = sample['error_rate']
+        self.virtual_input: FloatArray = sample['virtual_input']
+        self.internal_model: FloatArray = sample['internal_model']
 
     def __getstate__(self) -> tuple[Any, ...]:
         """What goes to another process; the readable arrays are views and made again there."""
@@ -77,13 +86,13 @@ class Regulator:
 
     @property
     def arrays(self) -> ControlArrays:
-        """The regulator's own arrays, for compiled loops that call ``law.control_step``."""
+        """The regulator's own arrays, for compiled loops that call ``control_step``."""
         return self._arrays
 
     def describe_loops(self) -> list[str]:
         """Margins and poles of the sampled closed loop, one line for each axis under control."""
         axes = zip(AXES, self.margins, self.parameters.axes, strict=True)
-        return [found.text(name) for name, found, own in axes if own.controlled]
+        return [margins.text(name) for name, margins, axis in axes if axis.controlled]
 
     def retuned(self, parameters: ControllerParameters) -> Regulator:
         """A regulator with other parameters that goes on in flight where this one is.
@@ -99,8 +108,8 @@ class Regulator:
     def take_over(self, previous: Regulator, maps: ModelMaps | None = None) -> None:
         """Go on where ``previous`` is, without a jump of w; both designed for the same stage.
 
-        With ``maps``, which :func:`maglev_controller.handover.model_maps` makes of the two, it is
-        done within a fraction of a sample.
+        With ``maps``, which :func:`~maglev_controller.bumpless_transfer.model_maps` makes of the
+        two, it is done within a fraction of a sample.
         """
         if maps is None:
             maps = model_maps(previous.arrays, self._arrays)
@@ -108,9 +117,19 @@ class Regulator:
 
     def reset(self) -> None:
         """Internal models at rest, observers and filters to start anew: do at every enable."""
-        self._arrays.state[:] = 0.0
-        self._arrays.state[:, law.FRESH] = 1.0
-        self._arrays.telemetry[:] = 0.0
+        records = self._arrays.records
+        records['axes'] = np.zeros((), AXIS)
+        records['axes']['fresh'] = True
+        records['sample'] = np.zeros((), SAMPLE)
+        self._arrays.xi[:] = 0.0
+
+    def save(self) -> tuple[NDArray[Any], ...]:
+        """What is remembered from sample to sample, for :meth:`restore`."""
+        return self._arrays.axes.copy(), self._arrays.xi.copy()
+
+    def restore(self, saved: tuple[NDArray[Any], ...]) -> None:
+        """Go back to what was saved."""
+        self._arrays.axes[:], self._arrays.xi[:] = saved
 
     def step(
         self,
@@ -134,14 +153,8 @@ class Regulator:
         stops' range or contradicts itself; both outputs are then zero and the regulator's state is
         as before.
         """
-        constants, gains, settings, state, telemetry, scratch = self._arrays
-        code = control_step(
-            constants,
-            gains,
-            settings,
-            state,
-            telemetry,
-            scratch,
+        code = answer_sample(
+            *self._arrays,
             gap,
             x,
             z,
@@ -151,18 +164,18 @@ class Regulator:
             direct_out,
             quadrature_out,
         )
-        if code > law.SATURATED:
+        if code > SATURATED:
             raise MeasurementFault(self.describe(code, gap, x, z))
-        return bool(code == law.SATURATED)
+        return code == SATURATED
 
     def describe(self, code: int, gap: FloatArray, x: float, z: float) -> str:
-        """What a fault code of ``law.control_step`` means for the measurement it came from."""
-        if code == law.BAD_REFERENCE:
+        """What a fault code of ``control_step`` means for the measurement it came from."""
+        if code == BAD_REFERENCE:
             return 'the reference is not finite, or far beyond any range'
         values = f'gap {np.array2string(gap, precision=6)} m, x {x:.6g} m, z {z:.6g} m'
-        if code == law.NOT_FINITE:
+        if code == NOT_FINITE:
             return f'the measurement is not finite: {values}'
-        if code == law.WARPED:
+        if code == WARPED:
             warp = gap[0] + gap[2] - gap[1] - gap[3]
             return (
                 f'the four gaps contradict each other by {warp:.3g} m (at most '
@@ -171,64 +184,72 @@ class Regulator:
         return f'the measurement is out of range: {values}: {self._out_of_range()}'
 
     def _out_of_range(self) -> str:
-        output = self._arrays.scratch[law.OUTPUT, :5]
-        bounds = self._arrays.settings[law.RANGE : law.RANGE + 10].reshape(5, 2)
-        for name, value, (low, high) in zip(AXES, output, bounds, strict=True):
+        settings, sample = self._arrays.settings, self._arrays.sample
+        outputs = zip(AXES, sample['output'], settings['lower'], settings['upper'], strict=True)
+        for name, value, low, high in outputs:
             if not low <= value <= high:
                 return f'{name} is {value:.6g}, the stops leave [{low:.6g}, {high:.6g}]'
         return 'a value left its range'
 
 
 def _control_arrays(
-    parameters: ControllerParameters, designs: tuple[AxisDesign, ...]
+    parameters: ControllerParameters, designs: Sequence[AxisDesign]
 ) -> ControlArrays:
-    states = max(1, *(design.model.order for design in designs))
-    gains = np.zeros((5, law.TRANSITION + states, states + 2))
-    for own, design in zip(gains, designs, strict=True):
-        n = design.model.order
-        own[law.GAIN, : n + 2] = design.total_gain
-        own[law.DRIVE, :n] = design.drive
-        own[law.ANTIWINDUP, :n] = design.antiwindup
-        own[law.TRANSITION : law.TRANSITION + n, :n] = design.transition
+    states = max(1, *(design.order for design in designs))
+    records = np.zeros(1, RECORDS)
+    settings = _settings(parameters, designs)
+    for name in SETTINGS.fields or ():
+        records['settings'][name] = settings[name]
+    models, transition = np.zeros((5, states), MODEL), np.zeros((5, states, states))
+    for index, design in enumerate(designs):
+        n = design.order
+        models['output'][index, :n] = design.gain[2:]
+        models['drive'][index, :n] = design.drive
+        models['antiwindup'][index, :n] = design.antiwindup
+        transition[index, :n, :n] = design.transition
     return ControlArrays(
-        constants=machine_to_array(machine_constants(parameters.machine)),
-        law=gains,
-        settings=_settings_array(parameters, designs[0]),
-        state=np.zeros((5, law.MODEL + states)),
-        telemetry=np.zeros((5, 5)),
-        scratch=np.zeros((5, max(5, states))),
+        records=records,
+        models=models,
+        transition=transition,
+        xi=np.zeros((5, states)),
     )
 
 
-def _settings_array(parameters: ControllerParameters, design: AxisDesign) -> FloatArray:
+def _settings(
+    parameters: ControllerParameters, designs: Sequence[AxisDesign]
+) -> dict[str, ArrayLike]:
     machine, limits = parameters.machine, parameters.limits
-    settings = np.zeros(law.SETTINGS)
-    settings[law.FILTER_GAIN], settings[law.FILTER_FORGET] = design.derivative
-    settings[law.FEED_FORWARD] = parameters.feed_forward
-    settings[law.INVERSE] = law.INVERSES.index(parameters.inverse)
-    settings[law.EQUILIBRIUM] = parameters.compensator.equilibrium
-    settings[law.PAPER_ANTIWINDUP] = parameters.internal_model.antiwindup == 'paper'
-    settings[law.CURRENT] = limits.current
-    settings[law.LEVITATION_FIRST] = limits.levitation_first
-    settings[law.LEAST_ATTRACTION] = limits.least_attraction
-    settings[law.WARP] = parameters.measurement.warp
-    settings[law.CONTROLLED : law.CONTROLLED + 5] = [axis.controlled for axis in parameters.axes]
     margin = np.full(5, parameters.measurement.margin)
     margin[3:] /= machine.radius
-    settings[law.RANGE : law.RANGE + 10 : 2] = np.array(machine.lower_limit) - margin
-    settings[law.RANGE + 1 : law.RANGE + 10 : 2] = np.array(machine.upper_limit) + margin
-    settings[law.PERIOD], settings[law.JUMP_TIME] = (
-        parameters.sample_time,
-        parameters.jumps.duration,
-    )
-    settings[law.JUMP_ACCELERATION : law.JUMP_ACCELERATION + 5] = parameters.jumps.acceleration
-    settings[law.LARGEST_ERROR : law.SETTINGS] = math.inf
-    if design.model.form != 'compensator':
-        learned = parameters.internal_model.largest_error
-        settings[law.LARGEST_ERROR : law.LARGEST_ERROR + 5] = learned
-        settings[law.ERROR_LIMIT : law.ERROR_LIMIT + 5] = limits.error
-    settings[law.OBSERVER] = design.observer != NO_OBSERVER
-    settings[law.OBSERVER_POSITION], settings[law.OBSERVER_VELOCITY] = design.observer
-    settings[law.AHEAD] = parameters.input_delay
-    settings[law.FADE] = math.exp(-parameters.sample_time / FADING_TIME)
-    return settings
+    gains = np.array([design.gain[:2] for design in designs])
+    filters = np.array([design.derivative for design in designs])
+    observers = np.array([design.observer for design in designs])
+    limited = [design.limits_errors for design in designs]
+    return {
+        'machine': machine_to_array(machine_constants(machine)),
+        'period': parameters.sample_time,
+        'controlled': [axis.controlled for axis in parameters.axes],
+        'lower': np.array(machine.lower_limit) - margin,
+        'upper': np.array(machine.upper_limit) + margin,
+        'warp': parameters.measurement.warp,
+        'inverse': INVERSES.index(parameters.inverse),
+        'equilibrium': parameters.compensator.equilibrium,
+        'current': limits.current,
+        'levitation_first': limits.levitation_first,
+        'least_attraction': limits.least_attraction,
+        'jump_time': parameters.jumps.duration,
+        'jump_acceleration': parameters.jumps.acceleration,
+        'feed_forward': parameters.feed_forward,
+        'error_gain': gains[:, 0],
+        'rate_gain': gains[:, 1],
+        'error_limit': np.where(limited, limits.error, math.inf),
+        'learned_error': np.where(limited, parameters.internal_model.largest_error, math.inf),
+        'filter_gain': filters[:, 0],
+        'filter_forget': filters[:, 1],
+        'observed': [design.observer != NO_OBSERVER for design in designs],
+        'observer_position': observers[:, 0],
+        'observer_velocity': observers[:, 1],
+        'late': parameters.input_delay > 0,
+        'paper_antiwindup': parameters.internal_model.antiwindup == 'paper',
+        'fade': math.exp(-parameters.sample_time / FADING_TIME),
+    }

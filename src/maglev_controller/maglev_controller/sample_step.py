@@ -1,16 +1,19 @@
-"""One sample of the control law on flat arrays, compiled: (14), (16), (17) and an inverse.
+"""One sample of the control law, compiled: (14), (16), (17) and an inverse.
 
-:class:`~maglev_controller.regulator.Regulator` fills the arrays and explains the law.
+:class:`~maglev_controller.regulator.Regulator` fills the arrays and explains the law. What has one
+size is held in records whose fields have names; what grows with the order n of the internal models
+is held in arrays, so that no n needs machine code of its own.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
 from maglev_model.equilibrium import equilibrium_inverse
 from maglev_model.inverse import CurrentLimits, exact_inverse, simplified_inverse
@@ -18,7 +21,8 @@ from maglev_model.machine import Machine, machine_from_array
 from maglev_model.platen import outputs_from_gaps
 from maglev_model.quintic import quintic_to_zero, transition_time
 
-FloatArray = NDArray[np.float64]
+Record = Any
+"""An element of an array of records, whose fields compiled code reads and writes as attributes."""
 
 JUMP: Final = 2e-4
 """A change of the reference within one sample that its velocity does not explain [m, rad] and that
@@ -27,69 +31,88 @@ counts as a jump; a reference without velocities can still move at 0.2 m/s."""
 LARGEST_REFERENCE: Final = 1e6
 """Sum of all the reference's magnitudes beyond which it is refused, like one that is not finite."""
 
-# Rows of an axis' law: total gain on (e, ė, ξ), N_d, E_d, then Φ_d.
-GAIN: Final = 0
-DRIVE: Final = 1
-ANTIWINDUP: Final = 2
-TRANSITION: Final = 3
-
-# Elements of the settings.
-FILTER_GAIN: Final = 0  # [1/s]
-FILTER_FORGET: Final = 1
-FEED_FORWARD: Final = 2
-INVERSE: Final = 3  # one of INVERSES, by its number
-PAPER_ANTIWINDUP: Final = 4
-CURRENT: Final = 5  # [A]
-LEVITATION_FIRST: Final = 6
-LEAST_ATTRACTION: Final = 7
-WARP: Final = 8  # [m]
-PERIOD: Final = 9  # [s]
-JUMP_TIME: Final = 10  # [s]
-CONTROLLED: Final = 11  # five
-RANGE: Final = 16  # lower and upper bound of each axis
-JUMP_ACCELERATION: Final = 26  # five
-EQUILIBRIUM: Final = 31  # air gap [m]
-OBSERVER: Final = 32  # 1: rates come from the observer, 0: from the derivative filter
-OBSERVER_POSITION: Final = 33
-OBSERVER_VELOCITY: Final = 34  # [1/s]
-AHEAD: Final = 35  # 1: the observer predicts one sample, as the currents come that late
-FADE: Final = 36  # share of a bump that is left a sample later
-LARGEST_ERROR: Final = 37  # that an internal model learns from; five
-ERROR_LIMIT: Final = 42  # of the error that is fed back; five
-SETTINGS: Final = 47
-
 INVERSES: Final = ('simplified', 'exact', 'equilibrium')
 SIMPLIFIED: Final = 0
 EXACT: Final = 1
 
-# Columns of an axis' state.
-FRESH: Final = 0  # 1 before the first sample
-FILTER: Final = 1  # f of the derivative filter
-LAGGED: Final = 2  # velocity of the reference, through the same filter
-LAST_POSITION: Final = 3  # of the reference
-LAST_VELOCITY: Final = 4
-LAST_SPEED: Final = 5  # of the reference with jumps made good
-DURATION: Final = 6  # of the transition that makes a jump good
-ELAPSED: Final = 7
-OFFSET: Final = 8  # position, velocity, acceleration at its start
-ESTIMATE: Final = 11  # position and velocity, predicted for this sample
-PENDING: Final = 13  # acceleration commanded that has yet to act, where the currents come late
-LAST_ERROR: Final = 14  # as w used it
-LAST_ACCELERATION: Final = 15  # of the reference
-BUMP: Final = 16  # share of w that fades, so that w does not jump when gains change
-MODEL: Final = 17  # ξ
+SETTINGS: Final = np.dtype(
+    [
+        ('machine', 'f8', len(Machine._fields)),  # as machine_from_array takes it
+        ('period', 'f8'),  # [s]
+        ('controlled', 'f8', 5),  # 1, or 0 for an axis that gets no control
+        ('lower', 'f8', 5),  # outputs that are believed [m, rad]
+        ('upper', 'f8', 5),
+        ('warp', 'f8'),  # that is believed, at most [m]
+        ('inverse', 'i8'),  # one of INVERSES, by its number
+        ('equilibrium', 'f8'),  # air gap that is linearised about [m]
+        ('current', 'f8'),  # CurrentLimits
+        ('levitation_first', 'f8'),
+        ('least_attraction', 'f8'),
+        ('jump_time', 'f8'),  # [s]
+        ('jump_acceleration', 'f8', 5),
+        ('feed_forward', 'f8'),  # 1, or 0
+        ('error_gain', 'f8', 5),  # of w on e
+        ('rate_gain', 'f8', 5),  # of w on ė
+        ('error_limit', 'f8', 5),  # of the error that is fed back
+        ('learned_error', 'f8', 5),  # that an internal model learns from, at most
+        ('filter_gain', 'f8', 5),  # of the derivative filter [1/s]
+        ('filter_forget', 'f8', 5),
+        ('observed', 'i1', 5),  # whether the rate comes from the observer, not from the filter
+        ('observer_position', 'f8', 5),
+        ('observer_velocity', 'f8', 5),  # [1/s]
+        ('late', '?'),  # whether the currents come a sample late, and the observer predicts it
+        ('paper_antiwindup', '?'),
+        ('fade', 'f8'),  # what is left of a bump a sample later
+    ],
+    align=True,
+)
 
-# Rows of the telemetry, and of the scratch space.
-POSITION: Final = 0
-ERROR: Final = 1
-ERROR_RATE: Final = 2
-VIRTUAL_INPUT: Final = 3
-INTERNAL_MODEL: Final = 4
-OUTPUT: Final = 0
-REALISED: Final = 1
-USED_ERROR: Final = 2
-EXCESS: Final = 3
-NEXT: Final = 4
+AXIS: Final = np.dtype(
+    [
+        ('fresh', '?'),  # before the first sample
+        ('filtered_position', 'f8'),  # f of the derivative filter
+        ('filtered_velocity', 'f8'),  # of the reference, through the same filter
+        ('reference_position', 'f8'),  # of the last sample
+        ('reference_velocity', 'f8'),
+        ('reference_acceleration', 'f8'),
+        ('smooth_velocity', 'f8'),  # of the reference with jumps made good
+        ('transition_duration', 'f8'),  # of what makes a jump good [s]
+        ('transition_elapsed', 'f8'),
+        ('transition_position', 'f8'),  # at its start
+        ('transition_velocity', 'f8'),
+        ('transition_acceleration', 'f8'),
+        ('estimated_position', 'f8'),  # predicted for this sample
+        ('estimated_velocity', 'f8'),
+        ('pending_acceleration', 'f8'),  # commanded, and yet to act where the currents come late
+        ('error', 'f8'),  # of the last sample, as w used it
+        ('bump', 'f8'),  # part of w that fades, so that w does not jump when gains change
+    ],
+    align=True,
+)
+
+SAMPLE: Final = np.dtype(
+    [
+        ('output', 'f8', 5),  # what was measured, believed or not
+        ('position', 'f8', 5),
+        ('error', 'f8', 5),
+        ('error_rate', 'f8', 5),
+        ('virtual_input', 'f8', 5),  # w
+        ('internal_model', 'f8', 5),  # its part of w
+        ('learned_error', 'f8', 5),
+        ('realised', 'f8', 5),  # accelerations that the currents give
+        ('excess', 'f8', 2),  # sat(u) - u of u_x and u_z [A]
+    ],
+    align=True,
+)
+
+RECORDS: Final = np.dtype(
+    [('settings', SETTINGS), ('axes', AXIS, 5), ('sample', SAMPLE)], align=True
+)
+"""All of these in one: what is constant, what is remembered of an axis (but for ξ), what the last
+sample came to. Python hands over one array faster than three."""
+
+MODEL: Final = np.dtype([('output', 'f8'), ('drive', 'f8'), ('antiwindup', 'f8')], align=True)
+"""What belongs to one state of an internal model: elements of κ (Γ included), N_d and E_d."""
 
 # What a step returns; above SATURATED it is a fault.
 OK: Final = 0
@@ -103,207 +126,299 @@ BAD_REFERENCE: Final = 5
 class ControlArrays(NamedTuple):
     """What :func:`control_step` works on; n is the order of the largest internal model."""
 
-    constants: FloatArray  # the machine, as machine_from_array takes it
-    law: FloatArray  # (5, 3 + n, 2 + n)
-    settings: FloatArray  # (SETTINGS,)
-    state: FloatArray  # (5, MODEL + n)
-    telemetry: FloatArray  # (5, 5)
-    scratch: FloatArray  # (5, max(5, n))
+    records: NDArray[np.void]  # (1,) of RECORDS
+    models: NDArray[np.void]  # (5, n) of MODEL
+    transition: FloatArray  # Φ_d, (5, n, n)
+    xi: FloatArray  # ξ, (5, n)
+
+    @property
+    def settings(self) -> Record:
+        """The one of SETTINGS."""
+        return self.records[0]['settings']
+
+    @property
+    def axes(self) -> NDArray[np.void]:
+        """The five of AXIS."""
+        return self.records[0]['axes']  # type: ignore[no-any-return]
+
+    @property
+    def sample(self) -> Record:
+        """The one of SAMPLE."""
+        return self.records[0]['sample']
+
+
+class Reading(NamedTuple):
+    """What the encoders read."""
+
+    gap: FloatArray  # (4,) [m]
+    x: float  # [m]
+    z: float
+
+
+class Reference(NamedTuple):
+    """What the outputs shall be, (5,) each."""
+
+    position: FloatArray  # [m, rad]
+    velocity: FloatArray
+    acceleration: FloatArray
+
+
+class Currents(NamedTuple):
+    """The answer, of motors 1..4, (4,) each."""
+
+    direct: FloatArray  # [A]
+    quadrature: FloatArray
 
 
 @compiled
-def _check(settings: FloatArray, output: FloatArray, warp: float, reference_size: float) -> int:
-    """Whether the outputs can be used: a fault code, or 0."""
+def _check(settings: Record, output: FloatArray, warp: float, reference: Reference) -> int:
+    """Whether outputs and reference can be used: a fault code, or 0."""
+    size = 0.0
+    for index in range(5):
+        size += (
+            abs(reference.position[index])
+            + abs(reference.velocity[index])
+            + abs(reference.acceleration[index])
+        )
     if not math.isfinite(output[0] + output[1] + output[2] + output[3] + output[4]):
         return NOT_FINITE
-    if not abs(warp) <= settings[WARP]:
+    if not abs(warp) <= settings.warp:
         return WARPED
-    for axis in range(5):
-        low, high = settings[RANGE + 2 * axis], settings[RANGE + 2 * axis + 1]
-        if not low <= output[axis] <= high:
+    for index in range(5):
+        if not settings.lower[index] <= output[index] <= settings.upper[index]:
             return OUT_OF_RANGE
-    if not reference_size < LARGEST_REFERENCE:
+    if not size < LARGEST_REFERENCE:
         return BAD_REFERENCE
     return OK
 
 
 @compiled
 def _follow_jump(
-    settings: FloatArray, axis: int, own: FloatArray, jump: float
+    settings: Record, axis: Record, index: int, jump: float
 ) -> tuple[float, float, float]:
     """What to add to the reference (position, velocity, acceleration) so that it has no jump.
 
-    A jump starts a transition that makes it good in ``JUMP_TIME`` or, where it is too far for that,
+    A jump starts a transition that makes it good in ``jump_time`` or, where it is too far for that,
     within the axis' acceleration; one that comes during another starts from where that one is.
     """
-    own[ELAPSED] += settings[PERIOD]
-    offset, rate, bend = quintic_to_zero(
-        own[OFFSET], own[OFFSET + 1], own[OFFSET + 2], own[DURATION], own[ELAPSED]
+    axis.transition_elapsed += settings.period
+    position, velocity, acceleration = quintic_to_zero(
+        axis.transition_position,
+        axis.transition_velocity,
+        axis.transition_acceleration,
+        axis.transition_duration,
+        axis.transition_elapsed,
     )
-    if settings[JUMP_TIME] > 0.0 and abs(jump) > JUMP:
-        offset -= jump
-        own[OFFSET], own[OFFSET + 1], own[OFFSET + 2] = offset, rate, bend
-        own[ELAPSED] = 0.0
-        own[DURATION] = transition_time(
-            offset, settings[JUMP_ACCELERATION + axis], settings[JUMP_TIME]
+    if settings.jump_time > 0.0 and abs(jump) > JUMP:
+        position -= jump
+        axis.transition_position = position
+        axis.transition_velocity = velocity
+        axis.transition_acceleration = acceleration
+        axis.transition_elapsed = 0.0
+        axis.transition_duration = transition_time(
+            position, settings.jump_acceleration[index], settings.jump_time
         )
-    return offset, rate, bend
+    return position, velocity, acceleration
 
 
 @compiled
-def _observe(settings: FloatArray, own: FloatArray, measured: float) -> tuple[float, float]:
+def _observe(settings: Record, axis: Record, index: int, measured: float) -> tuple[float, float]:
     """Position and velocity when w acts: the prediction, corrected with what is measured."""
-    surprise = measured - own[ESTIMATE]
-    own[ESTIMATE] += settings[OBSERVER_POSITION] * surprise
-    own[ESTIMATE + 1] += settings[OBSERVER_VELOCITY] * surprise
-    position, velocity = own[ESTIMATE], own[ESTIMATE + 1]
-    if settings[AHEAD] != 0.0:
-        period, push = settings[PERIOD], own[PENDING]
-        position += period * (velocity + 0.5 * period * push)
-        velocity += period * push
+    surprise = measured - axis.estimated_position
+    axis.estimated_position += settings.observer_position[index] * surprise
+    axis.estimated_velocity += settings.observer_velocity[index] * surprise
+    position, velocity = axis.estimated_position, axis.estimated_velocity
+    if settings.late:
+        period, acceleration = settings.period, axis.pending_acceleration
+        position += period * (velocity + 0.5 * period * acceleration)
+        velocity += period * acceleration
     return position, velocity
 
 
 @compiled
-def _predict(settings: FloatArray, own: FloatArray, realised: float) -> None:
+def _predict(settings: Record, axis: Record, realised: float) -> None:
     """Carry the estimate over to the next sample, its input known."""
-    acting = realised
-    if settings[AHEAD] != 0.0:
-        acting, own[PENDING] = own[PENDING], realised
-    period = settings[PERIOD]
-    own[ESTIMATE] += period * (own[ESTIMATE + 1] + 0.5 * period * acting)
-    own[ESTIMATE + 1] += period * acting
+    acceleration = realised
+    if settings.late:
+        acceleration, axis.pending_acceleration = axis.pending_acceleration, realised
+    period = settings.period
+    axis.estimated_position += period * (axis.estimated_velocity + 0.5 * period * acceleration)
+    axis.estimated_velocity += period * acceleration
 
 
 @compiled
-def _virtual_inputs(
-    law: FloatArray,
-    settings: FloatArray,
-    state: FloatArray,
-    telemetry: FloatArray,
-    position: FloatArray,
-    velocity: FloatArray,
-    acceleration: FloatArray,
-    used_error: FloatArray,
-) -> None:
-    """w of (16) on every axis; fills the telemetry and moves the derivative filters on."""
-    gain, forget = settings[FILTER_GAIN], settings[FILTER_FORGET]
-    states = state.shape[1] - MODEL
-    for axis in range(5):
-        own = state[axis]
-        measured = telemetry[POSITION, axis]
-        fresh = own[FRESH] != 0.0
-        if fresh:
-            own[FRESH], own[FILTER] = 0.0, measured
-            jump = position[axis] - measured
-        else:
-            mean = 0.5 * (velocity[axis] + own[LAST_VELOCITY])
-            jump = position[axis] - own[LAST_POSITION] - settings[PERIOD] * mean
-        offset, rate, bend = _follow_jump(settings, axis, own, jump)
-        speed = velocity[axis] + rate
-        if not fresh:
-            own[LAGGED] += forget * (0.5 * (speed + own[LAST_SPEED]) - own[LAGGED])
-        own[LAST_POSITION], own[LAST_VELOCITY], own[LAST_SPEED] = (
-            position[axis],
-            velocity[axis],
-            speed,
-        )
-        error = measured - position[axis] - offset
-        limit = settings[LARGEST_ERROR + axis]
-        used_error[axis] = min(max(error, -limit), limit)
-        if settings[OBSERVER] != 0.0:
-            if fresh:
-                own[ESTIMATE], own[ESTIMATE + 1], own[PENDING] = measured, 0.0, 0.0
-            seen, rate_seen = _observe(settings, own, measured)
-            error, error_rate = seen - position[axis] - offset, rate_seen - speed
-        else:
-            change = measured - own[FILTER]
-            own[FILTER] += forget * change
-            error_rate = gain * change - own[LAGGED]
-        share = 0.0
-        for index in range(states):
-            share += law[axis, GAIN, 2 + index] * own[MODEL + index]
-        error = min(max(error, -settings[ERROR_LIMIT + axis]), settings[ERROR_LIMIT + axis])
-        own[LAST_ERROR], own[LAST_ACCELERATION] = error, acceleration[axis]
-        own[BUMP] *= settings[FADE]
-        w = law[axis, GAIN, 0] * error + law[axis, GAIN, 1] * error_rate + share + own[BUMP]
-        telemetry[ERROR, axis] = measured - position[axis]
-        telemetry[ERROR_RATE, axis] = error_rate
-        telemetry[INTERNAL_MODEL, axis] = share
-        telemetry[VIRTUAL_INPUT, axis] = w + bend + settings[FEED_FORWARD] * acceleration[axis]
+def _model_parts(control: ControlArrays, sample: Record) -> None:
+    """What the internal models of all axes add to w: κ ξ."""
+    for index in range(5):
+        part = 0.0
+        for row in range(control.xi.shape[1]):
+            part += control.models[index, row].output * control.xi[index, row]
+        sample.internal_model[index] = part
 
 
 @compiled
-def _advance_models(
-    law: FloatArray,
-    settings: FloatArray,
-    state: FloatArray,
-    telemetry: FloatArray,
-    realised: FloatArray,
-    excess: FloatArray,
-    used_error: FloatArray,
-    new: FloatArray,
+def _virtual_input(
+    settings: Record,
+    sample: Record,
+    axis: Record,
+    index: int,
+    position: float,
+    velocity: float,
+    acceleration: float,
 ) -> None:
-    """ξ⁺ = Φ_d ξ + N_d e + E_d (what was realised less what was wanted), (14), (17)."""
-    states = state.shape[1] - MODEL
-    paper = settings[PAPER_ANTIWINDUP] != 0.0
-    for axis in range(5):
-        if settings[OBSERVER] != 0.0:
-            _predict(settings, state[axis], realised[axis])
-        if settings[CONTROLLED + axis] == 0.0:
-            continue
-        error = used_error[axis]
-        if paper:
-            lost = excess[axis - 1] if axis == 1 or axis == 2 else 0.0
-        else:
-            lost = realised[axis] - telemetry[VIRTUAL_INPUT, axis]
-        for row in range(states):
-            value = law[axis, DRIVE, row] * error + law[axis, ANTIWINDUP, row] * lost
-            for column in range(states):
-                value += law[axis, TRANSITION + row, column] * state[axis, MODEL + column]
-            new[row] = value
-        for row in range(states):
-            state[axis, MODEL + row] = new[row]
+    """w of (16) on one axis with its reference; moves the estimator of the rate on."""
+    measured = sample.position[index]
+    fresh = axis.fresh
+    if fresh:
+        axis.fresh, axis.filtered_position = False, measured
+        axis.estimated_position, axis.estimated_velocity = measured, 0.0
+        axis.pending_acceleration = 0.0
+        jump = position - measured
+    else:
+        mean = 0.5 * (velocity + axis.reference_velocity)
+        jump = position - axis.reference_position - settings.period * mean
+    to_position, to_velocity, to_acceleration = _follow_jump(settings, axis, index, jump)
+    smooth_velocity = velocity + to_velocity
+    forget = settings.filter_forget[index]
+    if not fresh:
+        middle = 0.5 * (smooth_velocity + axis.smooth_velocity)
+        axis.filtered_velocity += forget * (middle - axis.filtered_velocity)
+    axis.reference_position, axis.reference_velocity = position, velocity
+    axis.reference_acceleration = acceleration
+    axis.smooth_velocity = smooth_velocity
+    error = measured - position - to_position
+    sample.learned_error[index] = _limited(error, settings.learned_error[index])
+    if settings.observed[index]:
+        seen, seen_velocity = _observe(settings, axis, index, measured)
+        error, error_rate = seen - position - to_position, seen_velocity - smooth_velocity
+    else:
+        change = measured - axis.filtered_position
+        axis.filtered_position += forget * change
+        error_rate = settings.filter_gain[index] * change - axis.filtered_velocity
+    error = _limited(error, settings.error_limit[index])
+    axis.error = error
+    axis.bump *= settings.fade
+    feedback = settings.error_gain[index] * error + settings.rate_gain[index] * error_rate
+    w = feedback + sample.internal_model[index] + axis.bump
+    sample.error[index] = measured - position
+    sample.error_rate[index] = error_rate
+    sample.virtual_input[index] = w + to_acceleration + settings.feed_forward * acceleration
+
+
+@compiled
+def _limited(value: float, limit: float) -> float:
+    return min(max(value, -limit), limit)
 
 
 @compiled
 def _currents(
-    machine: Machine,
-    settings: FloatArray,
-    output: FloatArray,
-    wanted: FloatArray,
-    direct: FloatArray,
-    quadrature: FloatArray,
-    realised: FloatArray,
-    excess: FloatArray,
+    settings: Record, machine: Machine, sample: Record, direct: FloatArray, quadrature: FloatArray
 ) -> bool:
-    """The inverse of the settings; see the module ``inverse`` for the arguments."""
-    limits = CurrentLimits(
-        settings[CURRENT], settings[LEVITATION_FIRST], settings[LEAST_ATTRACTION]
-    )
-    controlled = settings[CONTROLLED : CONTROLLED + 5]
-    if settings[INVERSE] == EXACT:
+    """The inverse of the settings, from w; whether anything was limited."""
+    limits = CurrentLimits(settings.current, settings.levitation_first, settings.least_attraction)
+    controlled, wanted = settings.controlled, sample.virtual_input
+    realised, excess = sample.realised, sample.excess
+    if settings.inverse == EXACT:
         return exact_inverse(
-            machine, limits, controlled, output, wanted, direct, quadrature, realised, excess
+            machine,
+            limits,
+            controlled,
+            sample.position,
+            wanted,
+            direct,
+            quadrature,
+            realised,
+            excess,
         )
-    if settings[INVERSE] == SIMPLIFIED:
+    if settings.inverse == SIMPLIFIED:
         return simplified_inverse(
-            machine, limits, controlled, output, wanted, direct, quadrature, realised, excess
+            machine,
+            limits,
+            controlled,
+            sample.position,
+            wanted,
+            direct,
+            quadrature,
+            realised,
+            excess,
         )
-    gap = settings[EQUILIBRIUM]
+    gap = settings.equilibrium
     return equilibrium_inverse(
         machine, limits, controlled, gap, wanted, direct, quadrature, realised, excess
     )
 
 
 @compiled
+def _lost(settings: Record, sample: Record, index: int) -> float:
+    """What was realised less what was wanted: of w, or of the currents u_x and u_z as in (17)."""
+    if not settings.paper_antiwindup:
+        return float(sample.realised[index] - sample.virtual_input[index])
+    return float(sample.excess[index - 1]) if index == 1 or index == 2 else 0.0
+
+
+@compiled
+def _advance_models(control: ControlArrays, settings: Record, sample: Record) -> None:
+    """ξ⁺ = Φ_d ξ + N_d e + E_d (what was realised less what was wanted), (14), (17)."""
+    models, transition, xi = control.models, control.transition, control.xi
+    states = xi.shape[1]
+    following = np.empty(states)
+    for index in range(5):
+        if settings.controlled[index] == 0.0:
+            continue
+        error, lost = sample.learned_error[index], _lost(settings, sample, index)
+        for row in range(states):
+            value = models[index, row].drive * error + models[index, row].antiwindup * lost
+            for column in range(states):
+                value += transition[index, row, column] * xi[index, column]
+            following[row] = value
+        for row in range(states):
+            xi[index, row] = following[row]
+
+
+@compiled
 def control_step(
-    constants: FloatArray,
-    law: FloatArray,
-    settings: FloatArray,
-    state: FloatArray,
-    telemetry: FloatArray,
-    scratch: FloatArray,
+    control: ControlArrays, reading: Reading, reference: Reference, currents: Currents
+) -> int:
+    """One sample; see ``Regulator.step``. Returns a code; on a fault only the currents change."""
+    records = control.records[0]
+    settings, sample = records.settings, records.sample
+    machine = machine_from_array(settings.machine)
+    output = sample.output
+    warp = outputs_from_gaps(machine, reading.gap, reading.x, reading.z, output)
+    code = _check(settings, output, warp, reference)
+    if code != OK:
+        for motor in range(4):
+            currents.direct[motor] = 0.0
+            currents.quadrature[motor] = 0.0
+        return code
+    _model_parts(control, sample)
+    for index in range(5):
+        sample.position[index] = output[index]
+        _virtual_input(
+            settings,
+            sample,
+            records.axes[index],
+            index,
+            reference.position[index],
+            reference.velocity[index],
+            reference.acceleration[index],
+        )
+    saturated = _currents(settings, machine, sample, currents.direct, currents.quadrature)
+    for index in range(5):
+        if not saturated:
+            sample.realised[index] = sample.virtual_input[index]
+        if settings.observed[index]:
+            _predict(settings, records.axes[index], sample.realised[index])
+    _advance_models(control, settings, sample)
+    return SATURATED if saturated else OK
+
+
+@compiled
+def answer_sample(
+    records: NDArray[np.void],
+    models: NDArray[np.void],
+    transition: FloatArray,
+    xi: FloatArray,
     gap: FloatArray,
     x: float,
     z: float,
@@ -313,32 +428,10 @@ def control_step(
     direct: FloatArray,
     quadrature: FloatArray,
 ) -> int:
-    """One sample; see ``Regulator.step``. Returns a code; on a fault only the currents change."""
-    machine = machine_from_array(constants)
-    output, realised, used_error = (
-        scratch[OUTPUT, :5],
-        scratch[REALISED, :5],
-        scratch[USED_ERROR, :5],
+    """:func:`control_step` for calls from Python, which hand over arrays faster than tuples."""
+    return control_step(
+        ControlArrays(records, models, transition, xi),
+        Reading(gap, x, z),
+        Reference(position, velocity, acceleration),
+        Currents(direct, quadrature),
     )
-    excess, new = scratch[EXCESS, :2], scratch[NEXT]
-    warp = outputs_from_gaps(machine, gap, x, z, output)
-    size = 0.0
-    for axis in range(5):
-        size += abs(position[axis]) + abs(velocity[axis]) + abs(acceleration[axis])
-    code = _check(settings, output, warp, size)
-    if code != OK:
-        for motor in range(4):
-            direct[motor] = 0.0
-            quadrature[motor] = 0.0
-        return code
-    for axis in range(5):
-        telemetry[POSITION, axis] = output[axis]
-    _virtual_inputs(law, settings, state, telemetry, position, velocity, acceleration, used_error)
-    saturated = _currents(
-        machine, settings, output, telemetry[VIRTUAL_INPUT], direct, quadrature, realised, excess
-    )
-    if not saturated:
-        for axis in range(5):
-            realised[axis] = telemetry[VIRTUAL_INPUT, axis]
-    _advance_models(law, settings, state, telemetry, realised, excess, used_error, new)
-    return SATURATED if saturated else OK

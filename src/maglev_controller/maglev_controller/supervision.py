@@ -5,17 +5,15 @@ from __future__ import annotations
 import enum
 
 import numpy as np
-from numpy.typing import NDArray
 
-from maglev_controller.handover import ModelMaps, check_retuning
+from maglev_controller.bumpless_transfer import ModelMaps, check_retuning
+from maglev_controller.design_process import DesignProcess
 from maglev_controller.landing import Landing
 from maglev_controller.parameters import ControllerParameters
-from maglev_controller.redesign import Redesign
 from maglev_controller.reference_buffer import ReferenceBuffer
 from maglev_controller.regulator import MeasurementFault, Regulator
+from maglev_model.axes import FloatArray
 from maglev_model.phases import Phase
-
-FloatArray = NDArray[np.float64]
 
 
 class Mode(enum.IntEnum):
@@ -70,14 +68,14 @@ class Supervisor:
         """Whether currents flow."""
         return self.mode in (Mode.REGULATING, Mode.LANDING)
 
-    def redesign(self, parameters: ControllerParameters) -> Redesign:
+    def redesign(self, parameters: ControllerParameters) -> DesignProcess:
         """Begin to design a regulator for new parameters, to :meth:`adopt` between two steps.
 
         Raises ParameterError for what cannot change in flight.
         """
         if self.flying:
             check_retuning(self.parameters, parameters)
-        return Redesign(self.regulator, parameters)
+        return DesignProcess(self.regulator, parameters)
 
     def adopt(self, regulator: Regulator, maps: ModelMaps) -> None:
         """Go on with another regulator, in flight without a jump of its output."""

@@ -7,10 +7,16 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from maglev_controller import sample_step as law
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import MeasurementFault, Regulator
-from maglev_controller.sample_step import ControlArrays, control_step
+from maglev_controller.sample_step import (
+    SATURATED,
+    ControlArrays,
+    Currents,
+    Reading,
+    Reference,
+    control_step,
+)
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
 from maglev_model.records import Block
@@ -61,22 +67,12 @@ def _loop(
         state[k] = stage.state
         encode(block)
         code[k] = control_step(
-            control.constants,
-            control.law,
-            control.settings,
-            control.state,
-            control.telemetry,
-            control.scratch,
-            stage.reading[:4],
-            stage.reading[4],
-            stage.reading[5],
-            position[k],
-            velocity[k],
-            acceleration[k],
-            answer[:4],
-            answer[4:],
+            control,
+            Reading(stage.reading[:4], stage.reading[4], stage.reading[5]),
+            Reference(position[k], velocity[k], acceleration[k]),
+            Currents(answer[:4], answer[4:]),
         )
-        if code[k] > law.SATURATED:
+        if code[k] > SATURATED:
             return k
         if delayed:
             advance(block)
@@ -125,7 +121,7 @@ def run(
     if done < n:
         gap, x, z = arrays.reading[:4], float(arrays.reading[4]), float(arrays.reading[5])
         raise MeasurementFault(f'sample {done}: {regulator.describe(int(code[done]), gap, x, z)}')
-    return Run(state, current[:, :4], current[:, 4:], code == law.SATURATED)
+    return Run(state, current[:, :4], current[:, 4:], code == SATURATED)
 
 
 def warm_up() -> None:

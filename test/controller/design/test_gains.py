@@ -8,19 +8,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from maglev_controller.design.axis_design import AxisDesign, following_gain
 from maglev_controller.design.gains import (
     Weights,
     augmented,
     augmented_discrete,
+    bandwidth_weights,
     closed_loop_poles,
-    design_axis,
     dlqr,
     lqr,
-    observer_gain,
     place,
     split_phase,
 )
 from maglev_controller.design.internal_model import internal_model
+from maglev_controller.laws.output_regulator import design as design_axis
 from maglev_controller.parameters import ControllerParameters
 from maglev_model.parameters import ParameterError, build
 
@@ -41,6 +42,14 @@ LQR = {
 def sorted_poles(poles: np.ndarray) -> np.ndarray:
     """By real, then by imaginary part."""
     return np.array(sorted(poles, key=lambda p: (round(p.real, 4), round(p.imag, 4))))
+
+
+def feedback(design: AxisDesign) -> np.ndarray:
+    """K of (16), without Γ."""
+    assert design.model is not None
+    gain = design.gain.copy()
+    gain[2:] -= design.model.output
+    return gain
 
 
 def axis_parameters(**overrides: object) -> ControllerParameters:
@@ -126,14 +135,36 @@ def test_lqr_and_dlqr_agree_with_python_control(form: str) -> None:
 def test_the_default_gain_is_python_controls() -> None:
     """13 states, eleven of them on the unit circle in open loop; its oscillators then turned."""
     design = design_axis(ControllerParameters(), 'y')
+    assert design.model is not None
     state, drive = augmented_discrete(design.model, PERIOD)
     own = ControllerParameters().y
     integrator, oscillators = own.weight_model
     cost = np.diag([own.weight_error, own.weight_rate, integrator] + [oscillators] * 10)
     wanted = -control.dlqr(state, drive[:, None], cost, np.array([[own.weight_effort]]))[0][0]
     untouched = design_axis(axis_parameters(internal_model__friction_slope=0.0), 'y')
-    np.testing.assert_allclose(untouched.gain, wanted, rtol=1e-4, atol=10.0)
-    np.testing.assert_allclose(design.gain[:3], wanted[:3], rtol=1e-5)
+    np.testing.assert_allclose(feedback(untouched), wanted, rtol=1e-4, atol=10.0)
+    np.testing.assert_allclose(feedback(design)[:3], wanted[:3], rtol=1e-5)
+
+
+def test_three_numbers_stand_for_the_weights() -> None:
+    """The gain of the design 'bandwidth' is that of its weights given one by one."""
+    three = axis_parameters(design='bandwidth', bandwidth=150.0, integration=60.0, learning=5.0)
+    weights = axis_parameters(
+        design='lqr_discrete',
+        weight_error=150.0**4,
+        weight_rate=2.0 * 150.0**2,
+        weight_model=(150.0**4 * 60.0**2, 150.0**4 * 5.0**2),
+        weight_effort=1.0,
+    )
+    np.testing.assert_array_equal(design_axis(three, 'y').gain, design_axis(weights, 'y').gain)
+
+
+@pytest.mark.parametrize('bandwidth', [20.0, 200.0])
+def test_bandwidth_is_where_the_poles_are(bandwidth: float) -> None:
+    """Without an internal model both continuous poles are at -W."""
+    model = internal_model([], 'modal')
+    poles = closed_loop_poles(model, lqr(model, bandwidth_weights(bandwidth, 90.0, 10.0)))
+    np.testing.assert_allclose(poles, -bandwidth, rtol=1e-6)
 
 
 @pytest.mark.parametrize('slope', [300.0, 1500.0, 1e9])
@@ -172,8 +203,8 @@ def test_antiwindup_observer_lets_go_and_does_not_ring() -> None:
     design = design_axis(ControllerParameters(), 'x')
     slowest = []
     for speed in (1.0, 10.0):
-        gain = observer_gain(design.model, design.total_gain, PERIOD, speed)
-        matrix = design.transition - np.outer(gain, design.total_gain[2:])
+        gain = following_gain(design.transition, design.gain[2:], PERIOD, speed)
+        matrix = design.transition - np.outer(gain, design.gain[2:])
         slowest.append(np.abs(np.linalg.eigvals(matrix)).max())
     assert slowest[1] < slowest[0] < 1.0
 
@@ -211,6 +242,7 @@ def test_antiwindup_observer_lets_go_and_does_not_ring() -> None:
         ),
         ({'weight_model': (0.0,)}, "y: .* 'weight_model' must be above 0"),
         ({'weight_model': (1.0, 2.0, 3.0)}, "y: 'weight_model' has 3 elements.* 1, 2 or 6"),
+        ({'design': 'bandwidth', 'internal_model__form': 'companion'}, "'companion' does not tell"),
         ({'antiwindup': (1.0, 2.0)}, "y: 'antiwindup' has 2 elements"),
         ({'internal_model__fundamental': 900.0}, 'more than half of what a sample time'),
     ],
@@ -225,7 +257,7 @@ def test_default_poles_do_what_the_default_weights_do() -> None:
     """Switching the design to poles keeps the loop nearly the same."""
     by_weights = design_axis(ControllerParameters(), 'z')
     by_poles = design_axis(build(ControllerParameters, {'z.design': 'poles'}), 'z')
-    np.testing.assert_allclose(by_poles.gain[:3], by_weights.gain[:3], rtol=0.02)
+    np.testing.assert_allclose(feedback(by_poles)[:3], feedback(by_weights)[:3], rtol=0.02)
 
 
 @pytest.mark.parametrize('multiples', [(0.0,), (1.0, 2.0), (0.0, 1.0), (0.0, 1.0, 2.0, 3.0, 4.0)])

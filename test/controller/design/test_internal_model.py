@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from maglev_controller.design.internal_model import discretise, internal_model
+from maglev_controller.design.internal_model import internal_model
+from maglev_controller.design.state_space import discretise
 from maglev_model.parameters import ParameterError
 
 OMEGA = 1.5 * np.pi

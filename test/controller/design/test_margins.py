@@ -9,13 +9,10 @@ import control
 import numpy as np
 import pytest
 
-from maglev_controller.design.gains import design_axis
-from maglev_controller.design.margins import (
-    closed_loop,
-    controller_system,
-    loop_margins,
-    plant_system,
-)
+from maglev_controller.design.axis_design import controller_system
+from maglev_controller.design.margins import loop_margins
+from maglev_controller.design.state_space import closed_loop, plant_system
+from maglev_controller.laws.output_regulator import design as design_axis
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
 from maglev_model.parameters import ParameterError, build, read_yaml

@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from maglev_controller.design.gains import AxisDesign
+from maglev_controller.design.axis_design import AxisDesign
 from maglev_controller.design.margins import loop_margins
-from maglev_controller.laws import CONTROL_LAWS, control_law
-from maglev_controller.parameters import LAWS, ControllerParameters
+from maglev_controller.laws import control_law, find_law, law_names
+from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
 from maglev_model.axes import AXES
 from maglev_model.equilibrium import equilibrium_current, equilibrium_inverse, stiffness
@@ -53,8 +53,8 @@ def loop(found: AxisDesign, stiff: float, delay: int = 0) -> control.StateSpace:
     compensator = control.ss(
         found.transition,
         found.drive[:, None],
-        -found.total_gain[None, 2:],
-        [[-found.total_gain[0]]],
+        -found.gain[None, 2:],
+        [[-found.gain[0]]],
         PERIOD,
     )
     assert compensator.nstates == n
@@ -65,15 +65,40 @@ def loop(found: AxisDesign, stiff: float, delay: int = 0) -> control.StateSpace:
 
 
 def test_every_law_has_a_name_a_file_and_a_regulator() -> None:
-    """Registry, parameter choices and params/laws agree, and all files build."""
-    assert tuple(CONTROL_LAWS) == LAWS
+    """The modules of the folder and params/laws agree, and all files build."""
     files = {path.stem for path in (PARAMS / 'laws').glob('*.yaml')}
-    assert files == set(LAWS) - {'output_regulator'}
+    assert files == set(law_names()) - {'output_regulator'}
     for name in files:
         chosen = parameters(name)
         assert chosen.law == name
         assert len(Regulator(chosen).designs) == 5
         build(PlantParameters, read_yaml(PARAMS / 'laws' / f'{name}.yaml', 'plant'))
+
+
+def test_a_law_of_another_package_is_found_by_its_dotted_path(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It designs and refuses as those here do; what is wrong in its module is told."""
+    package = tmp_path / 'someones_laws'
+    package.mkdir()
+    (package / '__init__.py').touch()
+    (package / 'doubled.py').write_text(
+        'import dataclasses\n'
+        'from maglev_controller.laws import feedback_soi\n'
+        'from maglev_controller.laws.feedback_soi import check\n'
+        'def design(parameters, axis):\n'
+        '    found = feedback_soi.design(parameters, axis)\n'
+        '    return dataclasses.replace(found, gain=1.1 * found.gain)\n'
+    )
+    (package / 'broken.py').write_text('1 / 0\n')
+    monkeypatch.syspath_prepend(tmp_path)
+    wanted = Regulator(parameters('feedback_soi')).designs[2].gain
+    found = Regulator(parameters('feedback_soi', law='someones_laws.doubled')).designs[2].gain
+    np.testing.assert_array_equal(found, 1.1 * wanted)
+    with pytest.raises(ParameterError, match='feeds back no rate'):
+        Regulator(parameters('feedback_soi', law='someones_laws.doubled', rate_estimate='observer'))
+    with pytest.raises(ParameterError, match='cannot be imported: ZeroDivisionError'):
+        find_law('someones_laws.broken')
 
 
 @pytest.mark.parametrize('law', SHAPED)
@@ -113,8 +138,8 @@ def test_the_shapes_are_what_they_are_called() -> None:
         compensator = control.ss(
             found.transition,
             found.drive[:, None],
-            -found.total_gain[None, 2:],
-            [[-found.total_gain[0]]],
+            -found.gain[None, 2:],
+            [[-found.gain[0]]],
             PERIOD,
         )
         zeros = control.ss2tf(compensator).zeros()
@@ -206,7 +231,17 @@ def test_what_the_linear_inverse_says_it_realises(wanted: list[float]) -> None:
         (
             'feedback_soi',
             {'law': 'feedback_sio'},
-            "'feedback_sio'.*must be one of output",
+            "'feedback_sio'.*must be one of feedback_lead_lag, .*output_regulator.* or the dotted",
+        ),
+        (
+            'feedback_soi',
+            {'law': 'no_such_package.my_law'},
+            "'law' is 'no_such_package.my_law', which cannot be imported: .*'no_such_package'",
+        ),
+        (
+            'feedback_soi',
+            {'law': 'maglev_model.axes'},
+            "'law' is 'maglev_model.axes', a module without the function 'check'",
         ),
         ('feedback_soi', {'machine__motors': 1}, "'z.controlled' is true.*y and x only"),
         ('feedback_soi', {'machine__motors': 3}, 'it must be 1 or 4'),

@@ -10,21 +10,12 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, solve_continuous_are, solve_discrete_are
 
-from maglev_controller.design.derivative import DerivativeFilter, derivative_filter
-from maglev_controller.design.internal_model import (
-    FloatArray,
-    InternalModel,
-    discretise,
-    internal_model,
-)
-from maglev_controller.design.observer import NO_OBSERVER, Observer, observer
-from maglev_controller.parameters import AxisParameters, ControllerParameters
+from maglev_controller.design.internal_model import InternalModel
+from maglev_controller.design.state_space import ComplexArray, discretise
+from maglev_model.axes import FloatArray
 from maglev_model.parameters import ParameterError
-
-ComplexArray = NDArray[np.complex128]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,86 +32,19 @@ class Weights:
     effort: float
 
 
-@dataclasses.dataclass(frozen=True)
-class AxisDesign:
-    """One axis ready to run at its sample time; n is the order of the internal model.
+def bandwidth_weights(bandwidth: float, integration: float, learning: float) -> Weights:
+    """The weights that three speeds stand for [rad/s]: W⁴, 2 W², W⁴ i² and W⁴ m², effort 1.
 
-    ``gain`` K (n + 2,) of (16), ``total_gain`` the same with Γ added, ``transition`` Φ_d (n, n),
-    ``drive`` N_d (n,), ``antiwindup`` E_d (n,); rates come from ``observer`` where there is one.
-    ``stiffness`` α [1/s²] of the plant ë = α e + w that it is designed for: 0 where the inverse
-    takes all of it away.
+    Without an internal model they put two poles at −W. An integral of e weighs as
+    much as e itself after 1 / i, what an oscillator has gathered after 1 / m.
     """
-
-    model: InternalModel
-    gain: FloatArray
-    total_gain: FloatArray
-    transition: FloatArray
-    drive: FloatArray
-    antiwindup: FloatArray
-    derivative: DerivativeFilter
-    observer: Observer = NO_OBSERVER
-    stiffness: float = 0.0
-
-
-def design_axis(parameters: ControllerParameters, axis: str) -> AxisDesign:
-    """Design the axis named ``axis``: y, x, z, phi or theta.
-
-    Raises :class:`ParameterError`, naming the axis and the reason, for a choice that has no
-    stabilising gain.
-    """
-    own: AxisParameters = getattr(parameters, axis)
-    shared, period = parameters.internal_model, parameters.sample_time
-    frequencies = [multiple * shared.fundamental for multiple in own.multiples]
-    model = internal_model(frequencies, shared.form, axis)
-    if model.order and model.frequencies[-1] * period >= 0.5 * np.pi:
-        raise ParameterError(
-            f'{axis}: internal-model frequency {model.frequencies[-1]:g} rad/s is more than half '
-            f'of what a sample time of {period:g} s can hold ({np.pi / period:g} rad/s)'
-        )
-    gain = _gain(own, model, period, axis)
-    if shared.friction_slope > 0.0 and own.design != 'poles' and model.form == 'modal':
-        gain = split_phase(model, gain, shared.friction_slope)
-    total = gain.copy()
-    total[2:] += model.output
-    derivative = derivative_filter(
-        parameters.derivative.bandwidth, period, parameters.derivative.discretisation
+    fourth = bandwidth**4
+    return Weights(
+        error=fourth,
+        rate=2.0 * bandwidth**2,
+        model=(fourth * integration**2, fourth * learning**2),
+        effort=1.0,
     )
-    watched = parameters.rate_estimate == 'observer'
-    inputs = np.stack([model.input, _paper_antiwindup(own, model, axis)], axis=1)
-    transition, driven = discretise(model.state, inputs, period)
-    antiwindup = np.zeros(model.order)
-    if shared.antiwindup == 'paper':
-        antiwindup = driven[:, 1]
-    elif shared.antiwindup == 'observer':
-        antiwindup = observer_gain(model, total, period, shared.antiwindup_speed)
-    return AxisDesign(
-        model=model,
-        gain=gain,
-        total_gain=total,
-        transition=transition,
-        drive=driven[:, 0],
-        antiwindup=antiwindup,
-        derivative=derivative,
-        observer=observer(parameters.observer.bandwidth, period) if watched else NO_OBSERVER,
-    )
-
-
-def _gain(own: AxisParameters, model: InternalModel, period: float, axis: str) -> FloatArray:
-    if own.design == 'poles':
-        return place(model, poles_from(own.poles_real, own.poles_imaginary, axis), axis)
-    weights = Weights(own.weight_error, own.weight_rate, own.weight_model, own.weight_effort)
-    if own.design == 'lqr_continuous':
-        return lqr(model, weights, axis)
-    return dlqr(model, weights, period, axis)
-
-
-def _paper_antiwindup(own: AxisParameters, model: InternalModel, axis: str) -> FloatArray:
-    if len(own.antiwindup) not in (1, model.order) and model.order:
-        raise ParameterError(
-            f"{axis}: 'antiwindup' has {len(own.antiwindup)} elements, the internal model has "
-            f'{model.order} states'
-        )
-    return np.broadcast_to(own.antiwindup, (model.order,)).astype(np.float64)
 
 
 def augmented(model: InternalModel) -> tuple[FloatArray, FloatArray]:
@@ -301,31 +225,6 @@ def closed_loop_poles(model: InternalModel, gain: FloatArray) -> ComplexArray:
     """Poles (n + 2,) [rad/s] of the continuous closed loop of (13), (14), (16)."""
     state, drive = augmented(model)
     return np.asarray(np.linalg.eigvals(state + np.outer(drive, gain)), dtype=np.complex128)
-
-
-def observer_gain(
-    model: InternalModel, total: FloatArray, period: float, speed: float
-) -> FloatArray:
-    """Anti-windup gain E (n,) that makes a saturated internal model follow what was realised.
-
-    While w is limited, ξ⁺ = Φ_d ξ + N_d e + E (sat w − w) has the matrix Φ_d − E κ, κ the gain on
-    ξ: an observer of ξ from the realised w. E is the stationary Kalman gain for process noise of
-    size ``speed`` [rad/s] through κ's direction; the larger, the faster the internal model lets go.
-    """
-    n = model.order
-    if n == 0:
-        return np.zeros(0)
-    state, _ = discretise(model.state, model.input[:, None], period)
-    kappa = total[2:]
-    scale = np.linalg.norm(kappa)
-    if scale == 0.0:
-        return np.zeros(n)
-    direction = kappa / scale
-    noise = np.eye(n) * (speed * period) ** 2
-    solution = solve_discrete_are(state.T, direction[:, None], noise, np.eye(1))
-    return np.asarray(
-        state @ solution @ direction / (1.0 + direction @ solution @ direction) / scale
-    )
 
 
 def poles_from(

@@ -13,16 +13,14 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
+from maglev_model.axes import FloatArray
 from maglev_model.parameters import ParameterError
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclasses.dataclass(frozen=True)
 class InternalModel:
-    """ξ̇ = Φ ξ + N e, share of w = Γ ξ, equation (14).
+    """ξ̇ = Φ ξ + N e, part of w = Γ ξ, equation (14).
 
     ``frequencies`` (m,) in rad/s, ascending, 0 for the integrator; ``state`` Φ (n, n), ``input`` N
     (n,), ``output`` Γ (n,). A frequency above 0 takes two states, so n = 2 m, less 1 with the
@@ -105,17 +103,3 @@ def _modal(frequencies: FloatArray) -> InternalModel:
         row += size
     mode = np.repeat(np.arange(len(sizes)), sizes).astype(np.int64)
     return InternalModel(frequencies, state, drive, drive.copy(), mode, 'modal')
-
-
-def discretise(
-    state: FloatArray, inputs: FloatArray, period: float
-) -> tuple[FloatArray, FloatArray]:
-    """Exact discretisation of ẋ = A x + B u, u held over ``period`` [s].
-
-    ``state`` A (n, n), ``inputs`` B (n, m) → (exp(A T) (n, n), ∫₀ᵀ exp(A τ) dτ B (n, m)).
-    """
-    n, m = inputs.shape
-    block = np.zeros((n + m, n + m))
-    block[:n, :n], block[:n, n:] = state, inputs
-    power = expm(block * period) if n else block
-    return power[:n, :n], power[:n, n:]

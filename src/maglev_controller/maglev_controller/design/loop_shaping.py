@@ -1,6 +1,6 @@
 """Loop shaping of one axis as it runs sampled: compensators from e to w with an integrator.
 
-A shape ``C(s) = K (1 + ω_i / s) F(s)`` has one figure left open, found here such that the sampled
+A shape ``C(s) = K (1 + ω_i / s) F(s)`` has one figure left open, set here such that the sampled
 loop with the plant ``1 / (s² - α)`` has the wanted phase margin at the wanted crossover. All is
 computed as it runs: the compensator sampled by Tustin's rule, the plant exactly, with w held.
 """
@@ -9,31 +9,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import solve_discrete_are
 from scipy.optimize import brentq
 
+from maglev_controller.design.axis_design import AxisDesign, following_gain
 from maglev_controller.design.derivative import derivative_filter
-from maglev_controller.design.gains import AxisDesign
-from maglev_controller.design.internal_model import FloatArray, InternalModel, discretise
+from maglev_controller.design.state_space import StateSpace, plant_system, response, tustin
 from maglev_controller.parameters import CompensatorParameters, ControllerParameters
 from maglev_model.axes import AXES
 from maglev_model.parameters import ParameterError
-
-
-class StateSpace(NamedTuple):
-    """``ξ̇ = A ξ + B e``, or ``ξ⁺ =`` when sampled, with the output ``c ξ + d e``.
-
-    Shapes (n, n), (n,), (n,).
-    """
-
-    state: FloatArray
-    input: FloatArray
-    output: FloatArray
-    direct: float
-
 
 Shape = Callable[[CompensatorParameters, float, float], StateSpace]
 """A family of compensators: of its figures, the crossover ωc [rad/s], and the figure left open."""
@@ -60,33 +45,6 @@ def second_order_integral(
     return StateSpace(state, np.array([1.0, 0.0, 1.0]), np.array([low, c_0 / high, c_1]), 0.0)
 
 
-def tustin(system: StateSpace, period: float) -> StateSpace:
-    """The system sampled with ``s = 2 (z - 1) / (T (z + 1))``, ``period`` T [s]."""
-    half = 0.5 * period * system.state
-    unit = np.eye(system.input.size)
-    before = np.linalg.inv(unit - half)
-    driven = period * (before @ system.input)
-    return StateSpace(
-        before @ (unit + half),
-        driven,
-        system.output @ before,
-        system.direct + 0.5 * float(system.output @ driven),
-    )
-
-
-def plant(stiffness: float, period: float) -> tuple[FloatArray, FloatArray]:
-    """``ë = α e + w``, w held over ``period`` [s]: state (e, ė), (2, 2), and input, (2,)."""
-    transition, drive = discretise(
-        np.array([[0.0, 1.0], [stiffness, 0.0]]), np.array([[0.0], [1.0]]), period
-    )
-    return transition, drive[:, 0]
-
-
-def response(transition: FloatArray, drive: FloatArray, output: FloatArray, z: complex) -> complex:
-    """``output (zI - transition)⁻¹ drive``."""
-    return complex(output @ np.linalg.solve(z * np.eye(len(drive)) - transition, drive))
-
-
 def shaped_axis(
     parameters: ControllerParameters, axis: str, shape: Shape, *, stiffness: float
 ) -> AxisDesign:
@@ -102,27 +60,15 @@ def shaped_axis(
             f'{axis}: a crossover of {crossover:g} rad/s is more than a quarter of what a sample '
             f'time of {period:g} s can hold ({math.pi / period:g} rad/s)'
         )
-    open_plant = plant(stiffness, period)
-    delay = parameters.input_delay
-    sampled = _fit(figures, crossover, shape, open_plant, (period, delay), axis)
-    n = sampled.input.size
-    total = -np.concatenate(([sampled.direct, 0.0], sampled.output))
-    antiwindup = np.zeros(n)
+    sampled = _fit(parameters, crossover, shape, plant_system(period, stiffness=stiffness), axis)
+    gain = -np.concatenate(([sampled.direct, 0.0], sampled.output))
+    antiwindup = np.zeros(sampled.input.size)
     if parameters.internal_model.antiwindup == 'observer':
         speed = parameters.internal_model.antiwindup_speed
-        antiwindup = _antiwindup(sampled, speed * period)
+        antiwindup = following_gain(sampled.state, gain[2:], period, speed)
     derivative = parameters.derivative
     return AxisDesign(
-        model=InternalModel(
-            np.zeros(1),
-            sampled.state,
-            sampled.input,
-            np.zeros(n),
-            np.zeros(n, dtype=np.int64),
-            'compensator',
-        ),
-        gain=total,
-        total_gain=total,
+        gain=gain,
         transition=sampled.state,
         drive=sampled.input,
         antiwindup=antiwindup,
@@ -132,21 +78,19 @@ def shaped_axis(
 
 
 def _fit(
-    figures: CompensatorParameters,
+    parameters: ControllerParameters,
     crossover: float,
     shape: Shape,
-    open_plant: tuple[FloatArray, FloatArray],
-    timing: tuple[float, int],
+    plant: StateSpace,
     axis: str,
 ) -> StateSpace:
-    """The sampled compensator with the phase margin; ``timing``: sample time [s], delay."""
-    period, delay = timing
-    z = complex(np.exp(1j * crossover * period))
-    along = response(*open_plant, np.array([1.0, 0.0]), z) / z**delay
+    """The sampled compensator that has the phase margin at the crossover."""
+    figures, period = parameters.compensator, parameters.sample_time
+    z = np.array([np.exp(1j * crossover * period)])
+    along = complex(response(plant, z)[0]) / complex(z[0]) ** parameters.input_delay
 
     def loop_gain(ratio: float) -> complex:
-        found = tustin(shape(figures, crossover, ratio), period)
-        return along * (found.direct + response(found.state, found.input, found.output, z))
+        return along * complex(response(tustin(shape(figures, crossover, ratio), period), z)[0])
 
     def missing(ratio: float) -> float:
         return math.degrees(np.angle(-loop_gain(ratio))) - figures.phase_margin
@@ -165,18 +109,5 @@ def _fit(
     ratio = float(ratios[first])
     if first > 0:
         ratio = float(brentq(missing, ratios[first - 1], ratios[first], xtol=1e-9))
-    found, gain = tustin(shape(figures, crossover, ratio), period), 1.0 / abs(loop_gain(ratio))
-    return found._replace(output=gain * found.output, direct=gain * found.direct)
-
-
-def _antiwindup(compensator: StateSpace, noise: float) -> FloatArray:
-    """E (n,) by which the compensator follows what was realised, as ``design.observer_gain``."""
-    kappa = -compensator.output
-    scale = float(np.linalg.norm(kappa))
-    direction = kappa / scale
-    solution = solve_discrete_are(
-        compensator.state.T, direction[:, None], np.eye(kappa.size) * noise**2, np.eye(1)
-    )
-    gain: FloatArray = compensator.state @ solution @ direction
-    gain /= (1.0 + direction @ solution @ direction) * scale
-    return gain
+    unit, gain = tustin(shape(figures, crossover, ratio), period), 1.0 / abs(loop_gain(ratio))
+    return unit._replace(output=gain * unit.output, direct=gain * unit.direct)

@@ -10,35 +10,28 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from maglev_controller.design.gains import AxisDesign
-from maglev_controller.design.internal_model import FloatArray, discretise
-from maglev_controller.design.observer import NO_OBSERVER
+from maglev_controller.design.axis_design import AxisDesign, controller_system
+from maglev_controller.design.state_space import (
+    ComplexArray,
+    StateSpace,
+    closed_loop,
+    plant_system,
+    response,
+)
 from maglev_controller.parameters import ControllerParameters, MarginParameters
+from maglev_model.axes import FloatArray
 from maglev_model.parameters import ParameterError
-
-ComplexArray = NDArray[np.complex128]
 
 _GRID = 1500  # frequencies looked at
 _SLOPES = 24  # slopes of friction looked at
 
 
-class Sampled(NamedTuple):
-    """x⁺ = A x + B u, y = C x + D u, one input, one output; shapes (n, n), (n,), (n,)."""
-
-    state: FloatArray
-    input: FloatArray
-    output: FloatArray
-    direct: float
-
-
 @dataclasses.dataclass(frozen=True)
 class LoopMargins:
-    """What :func:`loop_margins` found.
+    """Poles and margins of one axis, as :func:`loop_margins` computes them.
 
     ``poles`` (m,) of the sampled closed loop, z; ``crossover`` [rad/s], the highest; ``phase``
     margin [deg], the smallest at any crossover; gain margins as factors, ``gain_up`` (inf for
@@ -65,8 +58,8 @@ class LoopMargins:
     @property
     def natural_poles(self) -> ComplexArray:
         """The poles as ln z / T [rad/s], the slowest first, of a pair the upper; fast ones too."""
-        found = np.log(self.poles.astype(np.complex128) + 0.0) / self.period
-        upper = found[found.imag >= -1e-9]
+        poles = np.log(self.poles.astype(np.complex128) + 0.0) / self.period
+        upper = poles[poles.imag >= -1e-9]
         return np.asarray(upper[np.argsort(-upper.real)])
 
     def text(self, axis: str) -> str:
@@ -88,84 +81,6 @@ def _pole_text(pole: complex) -> str:
 
 def _decibel(factor: float) -> str:
     return f'{abs(20.0 * math.log10(factor)):.1f} dB' if 0.0 < factor < math.inf else 'any'
-
-
-def controller_system(design: AxisDesign, period: float, delay: int) -> Sampled:
-    """e to w as ``law.control_step`` computes it; ``delay`` is what the observer predicts over.
-
-    State (ξ, f) with the derivative filter; (ξ, predicted position and rate) with the observer, and
-    the w still to act with a delay.
-    """
-    n, gain = design.drive.size, design.total_gain
-    if design.observer == NO_OBSERVER:
-        rate, forget = design.derivative
-        state = np.zeros((n + 1, n + 1))
-        state[:n, :n], state[n, n] = design.transition, 1.0 - forget
-        return Sampled(
-            state,
-            np.append(design.drive, forget),
-            np.append(gain[2:], -gain[1] * rate),
-            float(gain[0] + gain[1] * rate),
-        )
-    step, push = np.array([[1.0, period], [0.0, 1.0]]), np.array([0.5 * period**2, period])
-    correction = np.array(design.observer)
-    size = n + 2 + (delay > 0)
-    seen, read = np.zeros((2, size)), correction
-    seen[:, n : n + 2] = np.eye(2) - np.outer(correction, [1.0, 0.0])
-    after, after_read = step @ seen, step @ read  # but for what acts
-    used, used_read = seen, read
-    if delay:
-        after[:, n + 2] = push
-        used, used_read = after, after_read
-    output, direct = gain[:2] @ used, float(gain[:2] @ used_read)
-    output[:n] += gain[2:]
-    state, drive = np.zeros((size, size)), np.zeros(size)
-    state[:n, :n], drive[:n] = design.transition, design.drive
-    state[n : n + 2], drive[n : n + 2] = after, after_read
-    if delay:
-        state[n + 2], drive[n + 2] = output, direct
-    else:
-        state[n : n + 2] += np.outer(push, output)
-        drive[n : n + 2] += push * direct
-    return Sampled(state, drive, output, direct)
-
-
-def plant_system(
-    period: float, delay: int = 0, *, stiffness: float = 0.0, friction: float = 0.0
-) -> Sampled:
-    """w to e: ë = α e − κ ė + w, held; ``stiffness`` α [1/s²], ``friction`` κ [1/s]."""
-    moved, pushed = discretise(
-        np.array([[0.0, 1.0], [stiffness, -friction]]), np.array([[0.0], [1.0]]), period
-    )
-    size = 2 + delay
-    state, drive = np.zeros((size, size)), np.zeros(size)
-    state[:2, :2] = moved
-    if delay == 0:
-        drive[:] = pushed[:, 0]
-    else:
-        state[:2, 2], drive[-1] = pushed[:, 0], 1.0
-        state[2:-1, 3:] = np.eye(delay - 1)
-    return Sampled(state, drive, np.eye(1, size)[0], 0.0)
-
-
-def closed_loop(controller: Sampled, plant: Sampled) -> FloatArray:
-    """The closed loop's transition matrix; state: the plant's, then the controller's."""
-    n = plant.input.size
-    loop = np.zeros((n + controller.input.size,) * 2)
-    loop[:n, :n] = plant.state + controller.direct * np.outer(plant.input, plant.output)
-    loop[:n, n:] = np.outer(plant.input, controller.output)
-    loop[n:, :n] = np.outer(controller.input, plant.output)
-    loop[n:, n:] = controller.state
-    return loop
-
-
-def response(system: Sampled, z: ComplexArray) -> ComplexArray:
-    """Frequency response at ``z`` (m,)."""
-    unit = np.eye(system.input.size)
-    columns = np.linalg.solve(
-        z[:, None, None] * unit - system.state, system.input.astype(np.complex128)[:, None]
-    )
-    return np.asarray(columns[:, :, 0] @ system.output + system.direct)
 
 
 def loop_margins(
@@ -202,9 +117,9 @@ def _crossover(omega: FloatArray, loop: ComplexArray) -> tuple[float, float]:
     k = np.nonzero(np.sign(size[:-1]) != np.sign(size[1:]))[0]
     if k.size == 0:
         return 0.0, 180.0
-    share = size[k] / (size[k] - size[k + 1])
-    at = loop[k] * (loop[k + 1] / loop[k]) ** share
-    crossovers = omega[k] * (omega[k + 1] / omega[k]) ** share
+    part = size[k] / (size[k] - size[k + 1])
+    at = loop[k] * (loop[k + 1] / loop[k]) ** part
+    crossovers = omega[k] * (omega[k + 1] / omega[k]) ** part
     return float(crossovers[-1]), float(np.min(np.abs(np.degrees(np.angle(-at)))))
 
 
@@ -212,15 +127,15 @@ def _gain_margins(loop: ComplexArray) -> tuple[float, float]:
     """Smallest factor above 1, and largest below, that puts ``loop`` on −1."""
     before, after = loop[:-1], loop[1:]
     crossing = (np.sign(before.imag) != np.sign(after.imag)) & (before.real < 0.0)
-    share = before.imag[crossing] / (before.imag - after.imag)[crossing]
-    real = before.real[crossing] + share * (after.real - before.real)[crossing]
+    part = before.imag[crossing] / (before.imag - after.imag)[crossing]
+    real = before.real[crossing] + part * (after.real - before.real)[crossing]
     factors = -1.0 / real[real < 0.0]
     up, down = factors[factors > 1.0], factors[factors < 1.0]
     return float(np.min(up, initial=math.inf)), float(np.max(down, initial=0.0))
 
 
 def _friction(
-    controller: Sampled, design: AxisDesign, timing: tuple[float, int], slope: float
+    controller: StateSpace, design: AxisDesign, timing: tuple[float, int], slope: float
 ) -> float:
     """The slope up to which every slope leaves the loop stable; ``timing``: sample time, delay."""
     reached = 0.0
@@ -239,66 +154,67 @@ def all_margins(
     parameters: ControllerParameters, designs: Sequence[AxisDesign]
 ) -> tuple[LoopMargins, ...]:
     """The margins of all axes; of axes designed alike only once."""
-    known: dict[tuple[bytes, float], LoopMargins] = {}
-    keys = [(design.total_gain.tobytes(), design.stiffness) for design in designs]
+    slope, delay = parameters.internal_model.friction_slope, parameters.input_delay
+    known: dict[object, LoopMargins] = {}
+    keys = [_key(design) for design in designs]
     for key, design in zip(keys, designs, strict=True):
         if key not in known:
-            known[key] = _margins_of(parameters, design)
+            known[key] = loop_margins(
+                design,
+                parameters.sample_time,
+                delay=delay,
+                designed=delay,
+                slope=slope if design.can_hunt else 0.0,
+            )
     return tuple(known[key] for key in keys)
 
 
-def _margins_of(parameters: ControllerParameters, design: AxisDesign) -> LoopMargins:
-    """The margins of one axis with the delay and the friction its parameters tell."""
-    own = parameters.internal_model
-    return loop_margins(
-        design,
-        parameters.sample_time,
-        delay=parameters.input_delay,
-        designed=parameters.input_delay,
-        slope=0.0 if design.model.form == 'compensator' else own.friction_slope,
-    )
+def _key(design: AxisDesign) -> object:
+    """All that the margins depend on."""
+    arrays = tuple(array.tobytes() for array in (design.gain, design.transition, design.drive))
+    return arrays, design.derivative, design.observer, design.stiffness, design.can_hunt
 
 
-def check_margins(parameters: ControllerParameters, found: LoopMargins, axis: str) -> None:
+def check_margins(parameters: ControllerParameters, margins: LoopMargins, axis: str) -> None:
     """Refuse a loop that is unstable, or short of the least margins unless they are overridden.
 
     Raises :class:`ParameterError`, naming the axis, the figure and what would help.
     """
-    if not found.spectral_radius < 1.0:
-        worst = found.poles[np.argmax(np.abs(found.poles))]
+    if not margins.spectral_radius < 1.0:
+        worst = margins.poles[np.argmax(np.abs(margins.poles))]
         raise ParameterError(
             f'{axis}: with these gains and this rate estimate the loop is unstable at a sample '
-            f'time of {found.period:g} s (largest pole |z| = {found.spectral_radius:.4f} at '
-            f'{abs(np.angle(worst)) / found.period:.4g} rad/s)'
+            f'time of {margins.period:g} s (largest pole |z| = {margins.spectral_radius:.4f} at '
+            f'{abs(np.angle(worst)) / margins.period:.4g} rad/s)'
         )
     if parameters.margins.override:
         return
-    short = _shortfall(parameters.margins, found)
+    short = _shortfall(parameters.margins, margins)
     if short:
         raise ParameterError(
-            f'{axis}: {short}; make the axis slower (its poles or LQR weights), '
+            f'{axis}: {short}; make the axis slower (its bandwidth, LQR weights or poles), '
             "or take it as it is with 'margins.override'"
         )
-    slope = found.wanted_slope
-    if found.friction_slope < 0.999 * slope:
+    slope = margins.wanted_slope
+    if margins.friction_slope < 0.999 * slope:
         raise ParameterError(
-            f'{axis}: standing still hunts with friction steeper than {found.friction_slope:.0f} '
+            f'{axis}: standing still hunts with friction steeper than {margins.friction_slope:.0f} '
             f"1/s, 'internal_model.friction_slope' asks for {slope:g}; make the axis faster or its "
-            'internal model slower (weight_model), or ask for less'
+            'internal model slower (its learning or weight_model), or ask for less'
         )
 
 
-def _shortfall(least: MarginParameters, found: LoopMargins) -> str:
-    if found.phase < least.phase:
+def _shortfall(least: MarginParameters, margins: LoopMargins) -> str:
+    if margins.phase < least.phase:
         return (
-            f"the phase margin is {found.phase:.1f} deg, 'margins.phase' asks for {least.phase:g}"
+            f"the phase margin is {margins.phase:.1f} deg, 'margins.phase' asks for {least.phase:g}"
         )
-    gain = min(found.gain_up, 1.0 / found.gain_down if found.gain_down > 0.0 else math.inf)
+    gain = min(margins.gain_up, 1.0 / margins.gain_down if margins.gain_down > 0.0 else math.inf)
     if gain < least.gain:
         return f"the gain margin is a factor {gain:.2f}, 'margins.gain' asks for {least.gain:g}"
-    if found.sensitivity > least.sensitivity:
+    if margins.sensitivity > least.sensitivity:
         return (
-            f"the sensitivity peaks at {found.sensitivity:.2f}, 'margins.sensitivity' allows "
+            f"the sensitivity peaks at {margins.sensitivity:.2f}, 'margins.sensitivity' allows "
             f'{least.sensitivity:g}'
         )
     return ''

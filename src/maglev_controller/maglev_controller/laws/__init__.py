@@ -1,57 +1,77 @@
-"""The control laws, one small file each: how the error of an axis becomes its virtual input w.
+"""The control laws, one module each: how the error of an axis becomes its virtual input w.
 
-A law is, for every axis, a linear compensator in state space, run sampled by ``law.control_step``:
-``w = D e + k ė + κ ξ``, ``ξ⁺ = Φ ξ + N e + E (what was realised less what was wanted)``, and the
+A law is, for every axis, a linear compensator in state space, run sampled by ``control_step``:
+``w = k (e, ė) + κ ξ``, ``ξ⁺ = Φ ξ + N e + E (what was realised less what was wanted)``, and the
 choice of inverse that makes currents from w.
 
 To add another:
 
-1. Write ``laws/my_law.py`` with a class that has the two methods of :class:`ControlLaw`: ``check``
-   refuses what contradicts the law, ``design`` gives the :class:`~.design.AxisDesign` of one axis.
-   A transfer function needs no more than its zeros and poles, see ``feedback_lead_lag.py``.
-2. Enter it in :data:`CONTROL_LAWS` below, and its name in ``parameters.LAWS``.
-3. If it has figures of its own, give them a group in ``parameters.py`` (and ``controller.yaml``).
-4. Write ``params/laws/my_law.yaml``: ``law: my_law``, and what its authors would set.
-
-Node, compiled loop, checks and ``scenarios/compare.sh`` take it from there.
+1. Write a module with two functions: ``check(parameters)`` raises
+   :class:`~maglev_model.parameters.ParameterError` with the reason for choices that contradict the
+   law, ``design(parameters, axis)`` gives the
+   :class:`~maglev_controller.design.axis_design.AxisDesign` of the axis y, x, z, phi or theta. A
+   transfer function needs no more than its zeros and poles, see ``feedback_lead_lag.py``. Two
+   constants are optional: ``HAS_CROSSOVER = True`` where ``compensator.crossover`` sets the
+   bandwidth, and ``REFERENCES``, the paper's references by number that the law is taken from.
+2. In this folder it is chosen by its name, ``law: my_law``; anywhere else where Python finds it, by
+   its dotted path, ``law: my_package.my_law``.
+3. To be compared with the others, it has a file ``params/laws/my_law.yaml``: ``law: my_law``, and
+   what its authors would set.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Protocol
+import dataclasses
+import importlib
+import pkgutil
+from collections.abc import Callable
 
-from maglev_controller.design.gains import AxisDesign
-from maglev_controller.laws.checks import check_machine
-from maglev_controller.laws.feedback_lead_lag import FeedbackLeadLag
-from maglev_controller.laws.feedback_soi import FeedbackSecondOrderIntegral
-from maglev_controller.laws.jacobian_lead_lag import JacobianLeadLag
-from maglev_controller.laws.output_regulator import InternalModelRegulator
-from maglev_controller.laws.regulator_3dof import Regulator3DOF
+from maglev_controller.checks import check_machine
+from maglev_controller.design.axis_design import AxisDesign
 from maglev_controller.parameters import ControllerParameters
+from maglev_model.parameters import ParameterError
 
 
-class ControlLaw(Protocol):
-    """What a law has to have."""
+@dataclasses.dataclass(frozen=True)
+class ControlLaw:
+    """What the module of a law offers."""
 
-    def check(self, parameters: ControllerParameters) -> None:
-        """Raise :class:`ParameterError` with the reason for choices that contradict the law."""
-
-    def design(self, parameters: ControllerParameters, axis: str) -> AxisDesign:
-        """Design the axis named ``axis``: y, x, z, phi or theta.
-
-        Raises :class:`ParameterError`, naming the axis and the reason, for what cannot be had.
-        """
+    check: Callable[[ControllerParameters], None]
+    design: Callable[[ControllerParameters, str], AxisDesign]
+    has_crossover: bool
+    references: tuple[int, ...]
 
 
-CONTROL_LAWS: Mapping[str, ControlLaw] = {
-    'output_regulator': InternalModelRegulator(),
-    'jacobian_lead_lag': JacobianLeadLag(),
-    'feedback_lead_lag': FeedbackLeadLag(),
-    'feedback_soi': FeedbackSecondOrderIntegral(),
-    'regulator_3dof': Regulator3DOF(),
-}
-"""The laws by name, as the parameter ``law`` takes it."""
+def law_names() -> tuple[str, ...]:
+    """The laws of this folder, by name."""
+    return tuple(sorted(module.name for module in pkgutil.iter_modules(__path__)))
+
+
+def find_law(name: str) -> ControlLaw:
+    """The law of a name, or of the dotted path of its module.
+
+    Raises :class:`ParameterError` when there is none, or when its module cannot be used.
+    """
+    given = f"parameter 'law' is '{name}'"
+    if '.' not in name and name not in law_names():
+        raise ParameterError(
+            f'{given}, it must be one of {", ".join(law_names())}, or the dotted path of a module'
+        )
+    try:
+        module = importlib.import_module(name if '.' in name else f'{__name__}.{name}')
+    except Exception as error:
+        raise ParameterError(
+            f'{given}, which cannot be imported: {type(error).__name__}: {error}'
+        ) from error
+    for function in ('check', 'design'):
+        if not callable(getattr(module, function, None)):
+            raise ParameterError(f"{given}, a module without the function '{function}' of a law")
+    return ControlLaw(
+        check=module.check,
+        design=module.design,
+        has_crossover=getattr(module, 'HAS_CROSSOVER', False),
+        references=getattr(module, 'REFERENCES', ()),
+    )
 
 
 def control_law(parameters: ControllerParameters) -> ControlLaw:
@@ -59,7 +79,7 @@ def control_law(parameters: ControllerParameters) -> ControlLaw:
 
     Raises :class:`ParameterError` with the reason for a contradiction.
     """
-    law = CONTROL_LAWS[parameters.law]
+    law = find_law(parameters.law)
     check_machine(parameters)
     law.check(parameters)
     return law

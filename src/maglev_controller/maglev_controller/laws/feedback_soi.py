@@ -8,20 +8,21 @@ encoders' noise from the currents.
 
 from __future__ import annotations
 
-from maglev_controller.design.gains import AxisDesign
+from maglev_controller.checks import check_compensator, check_inverse
+from maglev_controller.design.axis_design import AxisDesign
 from maglev_controller.design.loop_shaping import second_order_integral, shaped_axis
-from maglev_controller.laws.checks import check_compensator, check_inverse
 from maglev_controller.parameters import ControllerParameters
 
+REFERENCES = (6, 7, 8, 9)
+HAS_CROSSOVER = True
 
-class FeedbackSecondOrderIntegral:
-    """The law ``feedback_soi``."""
 
-    def check(self, parameters: ControllerParameters) -> None:
-        """Needs double integrators."""
-        check_inverse(parameters, linear=False)
-        check_compensator(parameters)
+def check(parameters: ControllerParameters) -> None:
+    """Needs double integrators."""
+    check_inverse(parameters, linear=False)
+    check_compensator(parameters)
 
-    def design(self, parameters: ControllerParameters, axis: str) -> AxisDesign:
-        """The zero that gives the phase margin at the crossover."""
-        return shaped_axis(parameters, axis, second_order_integral, stiffness=0.0)
+
+def design(parameters: ControllerParameters, axis: str) -> AxisDesign:
+    """The zero that gives the phase margin at the crossover."""
+    return shaped_axis(parameters, axis, second_order_integral, stiffness=0.0)

@@ -7,25 +7,26 @@ match it.
 
 from __future__ import annotations
 
-from maglev_controller.design.gains import AxisDesign, design_axis
-from maglev_controller.laws.checks import check_inverse
+from maglev_controller.checks import check_inverse
+from maglev_controller.design.axis_design import AxisDesign
+from maglev_controller.laws import output_regulator
 from maglev_controller.parameters import ControllerParameters
 from maglev_model.parameters import ParameterError
 
+REFERENCES = (11,)
 
-class Regulator3DOF:
-    """The law ``regulator_3dof``."""
 
-    def check(self, parameters: ControllerParameters) -> None:
-        """Refuse control of the tilts."""
-        check_inverse(parameters, linear=False)
-        for name in ('phi', 'theta'):
-            if getattr(parameters, name).controlled:
-                raise ParameterError(
-                    f"parameter '{name}.controlled' is true, but the law 'regulator_3dof' leaves "
-                    'the tilts to stoppers (lock phi and theta of the stage): set it to false'
-                )
+def check(parameters: ControllerParameters) -> None:
+    """Refuse control of the tilts."""
+    check_inverse(parameters, linear=False)
+    for name in ('phi', 'theta'):
+        if getattr(parameters, name).controlled:
+            raise ParameterError(
+                f"parameter '{name}.controlled' is true, but the law 'regulator_3dof' leaves "
+                'the tilts to stoppers (lock phi and theta of the stage): set it to false'
+            )
 
-    def design(self, parameters: ControllerParameters, axis: str) -> AxisDesign:
-        """As :class:`~.internal_model.InternalModelRegulator`; the tilts' gains are not used."""
-        return design_axis(parameters, axis)
+
+def design(parameters: ControllerParameters, axis: str) -> AxisDesign:
+    """As :mod:`~maglev_controller.laws.output_regulator`; the tilts' gains are not used."""
+    return output_regulator.design(parameters, axis)

@@ -6,19 +6,10 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from maglev_controller.laws import find_law
 from maglev_controller.parameters import ControllerParameters
 from maglev_model.parameters import ParameterError, build, read_yaml
 from maglev_plant.parameters import PlantParameters
-
-ORDER = (
-    'jacobian_lead_lag',
-    'feedback_lead_lag',
-    'feedback_soi',
-    'regulator_3dof',
-    'paper',
-    'default',
-)
-"""The approaches in the paper's order, the paper's own and the default last."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,17 +34,27 @@ class Contestant:
 def find_contestants(params: Path, names: Sequence[str] = ()) -> list[Contestant]:
     """The laws of a folder of parameters, or those named, on the benchmark plant.
 
+    They come in the order of the paper's references, then others, the paper's own and the default.
+
     Each file of ``params/laws`` is one; ``paper`` is ``params/paper.yaml``, ``default`` has no file
     but ``params/controller.yaml``. Raises :class:`ParameterError` for a name that is none of them,
     and for a file that cannot be used.
     """
     files = {path.stem: path for path in sorted((params / 'laws').glob('*.yaml'))}
     files |= {'paper': params / 'paper.yaml', 'default': params / 'controller.yaml'}
-    known = sorted(files, key=lambda name: (ORDER.index(name) if name in ORDER else -1, name))
+    everyone = sorted((_contestant(params, *item) for item in files.items()), key=_place)
     for name in names:
         if name not in files:
-            raise ParameterError(f"there is no law '{name}', there are: {', '.join(known)}")
-    return [_contestant(params, name, files[name]) for name in known if not names or name in names]
+            known = ', '.join(one.name for one in everyone)
+            raise ParameterError(f"there is no law '{name}', there are: {known}")
+    return [one for one in everyone if not names or one.name in names]
+
+
+def _place(contestant: Contestant) -> tuple[bool, tuple[int, ...], int, str]:
+    references = find_law(contestant.controller.law).references
+    last = ('paper', 'default')
+    rank = 1 + last.index(contestant.name) if contestant.name in last else 0
+    return not references, references, rank, contestant.name
 
 
 def _contestant(params: Path, name: str, path: Path) -> Contestant:

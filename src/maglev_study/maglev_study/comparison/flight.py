@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import MeasurementFault, Regulator
 from maglev_model.axes import PHI, FloatArray, Y
-from maglev_model.records import Block
 from maglev_plant.simulation import SimulatedStage
 from maglev_study.closed_loop import Run, run
 from maglev_study.comparison.contestants import Contestant
@@ -76,13 +76,14 @@ class Flight:
         """Go from 25 mm to a set-point (5,) in ``time`` [s] and hold it; false when that fails."""
         return self.follow(shaped(HOVER, goal, time, hold, self.period)) is not None
 
-    def save(self) -> tuple[Block, FloatArray]:
+    def save(self) -> tuple[NDArray[Any], ...]:
         """All that changes with time, for :meth:`restore`."""
-        return self.stage.arrays.block.copy(), self.regulator.arrays.state.copy()
+        return self.stage.arrays.block.copy(), *self.regulator.save()
 
-    def restore(self, saved: tuple[Block, FloatArray]) -> None:
+    def restore(self, saved: tuple[NDArray[Any], ...]) -> None:
         """Go back to what was saved."""
-        self.stage.arrays.block[:], self.regulator.arrays.state[:] = saved
+        self.stage.arrays.block[:] = saved[0]
+        self.regulator.restore(saved[1:])
 
     def step(self, begin: FloatArray, target: FloatArray, time: float, hold: float) -> Run | None:
         """A step from the set-point ``begin`` to ``target`` (5,), raw for ``time`` 0 [s].

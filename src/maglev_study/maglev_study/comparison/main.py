@@ -12,7 +12,7 @@ from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from maglev_controller.laws import control_law
+from maglev_controller.laws import control_law, find_law
 from maglev_model.axes import THETA, X, Y
 from maglev_model.parameters import ParameterError, replace
 from maglev_study.closed_loop import warm_up
@@ -20,8 +20,6 @@ from maglev_study.comparison.contestants import Contestant, find_contestants
 from maglev_study.comparison.experiments import Row, loops, steps, tracking
 from maglev_study.comparison.region import Region, region
 from maglev_study.comparison.table import table, to_json
-
-_WITH_COMPENSATOR = ('jacobian_lead_lag', 'feedback_lead_lag', 'feedback_soi')
 
 
 class Part(NamedTuple):
@@ -87,7 +85,7 @@ def _contestants(options: argparse.Namespace) -> list[Contestant]:
         change = {'compensator.crossover': (options.bandwidth,) * 5}
         found = [
             dataclasses.replace(one, controller=replace(one.controller, change))
-            if one.controller.law in _WITH_COMPENSATOR
+            if find_law(one.controller.law).has_crossover
             else one
             for one in found
         ]

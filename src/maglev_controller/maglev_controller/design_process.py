@@ -1,8 +1,8 @@
-"""A regulator designed in a process of its own, while the loop goes on.
+"""The process in which a regulator is designed while another one flies.
 
 Designing takes a tenth of a second and more, most of it in calls that keep the interpreter to
-themselves: in a thread it would stop the loop. ``python -m maglev_controller.redesign`` is the
-other process: it reads the regulator in use and the new parameters, and writes what came of it.
+themselves: in a thread it would stop the loop. ``python -m maglev_controller.design_process`` is
+the other process: it reads the regulator in use and the new parameters, and writes what came of it.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import sys
 import tempfile
 import time
 
-from maglev_controller.handover import ModelMaps, model_maps
+from maglev_controller.bumpless_transfer import ModelMaps, model_maps
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
 from maglev_model.parameters import ParameterError
@@ -22,7 +22,7 @@ from maglev_model.parameters import ParameterError
 _LONGEST = 20.0  # [s]
 
 
-class Redesign:
+class DesignProcess:
     """A design under way; :meth:`result` once it is :attr:`done`."""
 
     def __init__(self, regulator: Regulator, parameters: ControllerParameters) -> None:
@@ -33,7 +33,7 @@ class Redesign:
         self._input.seek(0)
         self._begun = time.monotonic()
         self._process = subprocess.Popen(
-            [sys.executable, '-m', 'maglev_controller.redesign'],
+            [sys.executable, '-m', 'maglev_controller.design_process'],
             stdin=self._input,
             stdout=self._output,
         )
@@ -53,10 +53,10 @@ class Redesign:
             content = self._output.read()
         if self._process.returncode != 0:
             raise ParameterError('the design failed or took too long; the old gains stay')
-        found = pickle.loads(content)
-        if isinstance(found, ParameterError):
-            raise found
-        regulator, maps = found
+        outcome = pickle.loads(content)
+        if isinstance(outcome, ParameterError):
+            raise outcome
+        regulator, maps = outcome
         return regulator, maps
 
 
@@ -69,8 +69,8 @@ def main() -> None:
     previous, parameters = pickle.load(sys.stdin.buffer)
     try:
         regulator = Regulator(parameters)
-        found = regulator, model_maps(previous.arrays, regulator.arrays)
-        sys.stdout.buffer.write(pickle.dumps(found))
+        outcome = regulator, model_maps(previous.arrays, regulator.arrays)
+        sys.stdout.buffer.write(pickle.dumps(outcome))
     except ParameterError as error:
         sys.stdout.buffer.write(pickle.dumps(error))
 

@@ -1,4 +1,7 @@
-"""Other gains in flight: what may change there, and how the new regulator goes on from the old."""
+"""Bumpless transfer: how a regulator takes over from another in flight, without a jump of w.
+
+And what cannot change in flight.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +9,9 @@ from typing import Final
 
 import numpy as np
 
-from maglev_controller import sample_step as law
-from maglev_controller.design.internal_model import FloatArray
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.sample_step import ControlArrays
+from maglev_model.axes import FloatArray
 from maglev_model.parameters import ParameterError, values
 
 ON_THE_GROUND: Final = ('sample_time', 'law', 'inverse', 'input_delay', 'machine.', 'compensator.')
@@ -51,58 +53,58 @@ def carry_over(old: ControlArrays, new: ControlArrays, maps: ModelMaps) -> None:
     ``maps`` are those of :func:`model_maps` for the two. Internal models: the state whose output,
     left to itself, is the old one's over the next two seconds, exactly where the frequencies are
     the same, closest in the mean square otherwise. Rates: what one estimator knows is translated
-    for the other. What the gains make of error and rate at the last sample differently goes into a
-    share of w that fades.
+    for the other. What the gains make of error and rate at the last sample differently goes into
+    the bump, which fades.
     """
-    new.telemetry[:] = old.telemetry
+    for part in ('axes', 'sample'):
+        new.records[part] = old.records[part]
+    new.xi[:] = 0.0
     for axis in range(5):
-        mine, its = new.state[axis], old.state[axis]
-        mine[: law.MODEL] = its[: law.MODEL]
-        if its[law.FRESH] != 0.0:
-            mine[law.MODEL :] = 0.0
+        if old.axes['fresh'][axis]:
             continue
-        if old.settings[law.OBSERVER] != new.settings[law.OBSERVER]:
-            _translate_rate(old, new, axis)
-        mine[law.MODEL :] = maps[axis] @ its[law.MODEL :]
-        mine[law.BUMP] += _wanted(old, axis) - _wanted(new, axis)
+        if old.settings['observed'][axis] != new.settings['observed'][axis]:
+            _translate_rate(new, axis)
+        new.xi[axis] = maps[axis] @ old.xi[axis]
+        new.axes['bump'][axis] += _wanted(old, axis) - _wanted(new, axis)
 
 
 def _wanted(arrays: ControlArrays, axis: int) -> float:
-    """w but for the share that fades, by the last sample's error and rate and ξ as it is now."""
-    gain, own = arrays.law[axis, law.GAIN], arrays.state[axis]
-    share = float(gain[2:] @ own[law.MODEL :])
-    rate = float(arrays.telemetry[law.ERROR_RATE, axis])
-    ahead = float(arrays.settings[law.FEED_FORWARD] * own[law.LAST_ACCELERATION])
-    return float(gain[0] * own[law.LAST_ERROR] + gain[1] * rate) + share + ahead
+    """w but for the bump, by the last sample's error and rate and ξ as it is now."""
+    settings, state = arrays.settings, arrays.axes[axis]
+    model_part = float(arrays.models['output'][axis] @ arrays.xi[axis])
+    rate = arrays.sample['error_rate'][axis]
+    ahead = float(settings['feed_forward'] * state['reference_acceleration'])
+    feedback = settings['error_gain'][axis] * state['error'] + settings['rate_gain'][axis] * rate
+    return float(feedback) + model_part + ahead
 
 
-def _translate_rate(old: ControlArrays, new: ControlArrays, axis: int) -> None:
-    """The rate one estimator has, in the other's state for the next sample."""
-    own, period = new.state[axis], float(new.settings[law.PERIOD])
-    measured = float(old.telemetry[law.POSITION, axis])
-    rate = float(old.telemetry[law.ERROR_RATE, axis]) + float(own[law.LAST_SPEED])
-    push = float(old.telemetry[law.VIRTUAL_INPUT, axis])
-    if new.settings[law.OBSERVER] != 0.0:
-        own[law.ESTIMATE] = measured + period * (rate + 0.5 * period * push)
-        own[law.ESTIMATE + 1] = rate + period * push
-        own[law.PENDING] = push
+def _translate_rate(new: ControlArrays, axis: int) -> None:
+    """The rate that the other estimator had, in this one's state for the next sample."""
+    settings, state, sample = new.settings, new.axes[axis], new.sample
+    period = float(settings['period'])
+    measured, acceleration = float(sample['position'][axis]), float(sample['virtual_input'][axis])
+    velocity = float(sample['error_rate'][axis]) + float(state['smooth_velocity'])
+    if settings['observed'][axis]:
+        state['estimated_position'] = measured + period * (velocity + 0.5 * period * acceleration)
+        state['estimated_velocity'] = velocity + period * acceleration
+        state['pending_acceleration'] = acceleration
     else:
-        own[law.FILTER] = measured + period * rate - rate / float(new.settings[law.FILTER_GAIN])
-        own[law.LAGGED] = own[law.LAST_SPEED]
+        lag = velocity / float(settings['filter_gain'][axis])
+        state['filtered_position'] = measured + period * velocity - lag
+        state['filtered_velocity'] = state['smooth_velocity']
 
 
 def _model_map(old: ControlArrays, new: ControlArrays, axis: int) -> FloatArray:
     outputs = _outputs(new, axis)
     scale = np.max(np.abs(outputs), axis=0)
     scale[scale == 0.0] = 1.0
-    found: FloatArray = np.linalg.pinv(outputs / scale, rcond=1e-10) @ _outputs(old, axis)
-    return np.asarray(found / scale[:, None])
+    scaled: FloatArray = np.linalg.pinv(outputs / scale, rcond=1e-10) @ _outputs(old, axis)
+    return np.asarray(scaled / scale[:, None])
 
 
 def _outputs(arrays: ControlArrays, axis: int) -> FloatArray:
     """What each state of an internal model, left to itself, adds to w at the moments compared."""
-    own = arrays.law[axis]
-    transition, output = own[law.TRANSITION :, :-2], own[law.GAIN, 2:]
+    transition, output = arrays.transition[axis], arrays.models['output'][axis]
     stride = np.linalg.matrix_power(transition, _STRIDE)
     rows = np.empty((_HORIZON, output.size))
     for row in rows:

@@ -1,4 +1,4 @@
-"""What more than one law refuses."""
+"""Contradictions between the choices of parameters, which the laws refuse."""
 
 from __future__ import annotations
 

@@ -1,0 +1,107 @@
+"""What a control law designs for one axis: a linear compensator, sampled, that runs as it is."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from scipy.linalg import solve_discrete_are
+
+from maglev_controller.design.derivative import DerivativeFilter
+from maglev_controller.design.internal_model import InternalModel
+from maglev_controller.design.observer import NO_OBSERVER, Observer
+from maglev_controller.design.state_space import StateSpace
+from maglev_model.axes import FloatArray
+
+
+@dataclasses.dataclass(frozen=True)
+class AxisDesign:
+    """w = k (e, ė) + κ ξ and ξ⁺ = Φ_d ξ + N_d e + E_d (what was realised less what was wanted).
+
+    ``gain`` (n + 2,) is k, then κ, which for an internal model is that of (16) with Γ in it;
+    ``transition`` Φ_d (n, n), ``drive`` N_d (n,), ``antiwindup`` E_d (n,). Rates come from
+    ``observer`` where there is one, else from ``derivative``. ``stiffness`` α [1/s²] of the plant ë
+    = α e + w that it is designed for: 0 where the inverse takes all of it away.
+
+    ``limits_errors``: large errors are fed back and learned from only as far as the parameters
+    ``limits.error`` and ``internal_model.largest_error`` say. ``can_hunt``: with friction at rest
+    it may hunt, which is looked into. ``model`` is the internal model that ξ is the state of, where
+    it is one.
+    """
+
+    gain: FloatArray
+    transition: FloatArray
+    drive: FloatArray
+    antiwindup: FloatArray
+    derivative: DerivativeFilter
+    observer: Observer = NO_OBSERVER
+    stiffness: float = 0.0
+    limits_errors: bool = False
+    can_hunt: bool = False
+    model: InternalModel | None = None
+
+    @property
+    def order(self) -> int:
+        """Number of states n."""
+        return int(self.drive.size)
+
+
+def controller_system(design: AxisDesign, period: float, delay: int) -> StateSpace:
+    """e to w as ``control_step`` computes it; ``delay`` is what the observer predicts over.
+
+    State (ξ, f) with the derivative filter; (ξ, predicted position and rate) with the observer, and
+    the w still to act with a delay.
+    """
+    n, gain = design.order, design.gain
+    if design.observer == NO_OBSERVER:
+        rate, forget = design.derivative
+        state = np.zeros((n + 1, n + 1))
+        state[:n, :n], state[n, n] = design.transition, 1.0 - forget
+        return StateSpace(
+            state,
+            np.append(design.drive, forget),
+            np.append(gain[2:], -gain[1] * rate),
+            float(gain[0] + gain[1] * rate),
+        )
+    step, push = np.array([[1.0, period], [0.0, 1.0]]), np.array([0.5 * period**2, period])
+    correction = np.array(design.observer)
+    size = n + 2 + (delay > 0)
+    seen, read = np.zeros((2, size)), correction
+    seen[:, n : n + 2] = np.eye(2) - np.outer(correction, [1.0, 0.0])
+    after, after_read = step @ seen, step @ read  # but for what acts
+    used, used_read = seen, read
+    if delay:
+        after[:, n + 2] = push
+        used, used_read = after, after_read
+    output, direct = gain[:2] @ used, float(gain[:2] @ used_read)
+    output[:n] += gain[2:]
+    state, drive = np.zeros((size, size)), np.zeros(size)
+    state[:n, :n], drive[:n] = design.transition, design.drive
+    state[n : n + 2], drive[n : n + 2] = after, after_read
+    if delay:
+        state[n + 2], drive[n + 2] = output, direct
+    else:
+        state[n : n + 2] += np.outer(push, output)
+        drive[n : n + 2] += push * direct
+    return StateSpace(state, drive, output, direct)
+
+
+def following_gain(
+    transition: FloatArray, output: FloatArray, period: float, speed: float
+) -> FloatArray:
+    """Anti-windup gain E_d (n,) that makes a compensator's state follow what was realised.
+
+    While w is limited, ξ⁺ = Φ_d ξ + N_d e + E_d (sat w − w) has the matrix Φ_d − E_d κ, κ the
+    ``output`` (n,): an observer of ξ from the realised w. E_d is the stationary Kalman gain for
+    process noise of size ``speed`` [rad/s] through κ's direction; the larger, the faster the state
+    lets go.
+    """
+    scale = np.linalg.norm(output)
+    if scale == 0.0:
+        return np.zeros(output.size)
+    direction = output / scale
+    noise = np.eye(output.size) * (speed * period) ** 2
+    solution = solve_discrete_are(transition.T, direction[:, None], noise, np.eye(1))
+    return np.asarray(
+        transition @ solution @ direction / (1.0 + direction @ solution @ direction) / scale
+    )

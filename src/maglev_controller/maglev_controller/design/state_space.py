@@ -1,0 +1,91 @@
+"""Linear systems with one input and one output, continuous or sampled, and the loop of two."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+from maglev_model.axes import FloatArray
+
+ComplexArray = NDArray[np.complex128]
+
+
+class StateSpace(NamedTuple):
+    """ẋ = A x + B u, or x⁺ = A x + B u when sampled; y = C x + D u. Shapes (n, n), (n,), (n,)."""
+
+    state: FloatArray
+    input: FloatArray
+    output: FloatArray
+    direct: float
+
+
+def discretise(
+    state: FloatArray, inputs: FloatArray, period: float
+) -> tuple[FloatArray, FloatArray]:
+    """Exact discretisation of ẋ = A x + B u, u held over ``period`` [s].
+
+    ``state`` A (n, n), ``inputs`` B (n, m) → (exp(A T) (n, n), ∫₀ᵀ exp(A τ) dτ B (n, m)).
+    """
+    n, m = inputs.shape
+    block = np.zeros((n + m, n + m))
+    block[:n, :n], block[:n, n:] = state, inputs
+    power = expm(block * period) if n else block
+    return power[:n, :n], power[:n, n:]
+
+
+def tustin(system: StateSpace, period: float) -> StateSpace:
+    """The system sampled with ``s = 2 (z - 1) / (T (z + 1))``, ``period`` T [s]."""
+    half = 0.5 * period * system.state
+    unit = np.eye(system.input.size)
+    before = np.linalg.inv(unit - half)
+    driven = period * (before @ system.input)
+    return StateSpace(
+        before @ (unit + half),
+        driven,
+        system.output @ before,
+        system.direct + 0.5 * float(system.output @ driven),
+    )
+
+
+def response(system: StateSpace, z: ComplexArray) -> ComplexArray:
+    """Frequency response of a sampled system at ``z`` (m,)."""
+    unit = np.eye(system.input.size)
+    columns = np.linalg.solve(
+        z[:, None, None] * unit - system.state, system.input.astype(np.complex128)[:, None]
+    )
+    return np.asarray(columns[:, :, 0] @ system.output + system.direct)
+
+
+def plant_system(
+    period: float, delay: int = 0, *, stiffness: float = 0.0, friction: float = 0.0
+) -> StateSpace:
+    """What the inverse leaves of an axis, sampled with w held and ``delay`` samples late: w to e.
+
+    ë = α e − κ ė + w with ``stiffness`` α [1/s²] and ``friction`` κ [1/s].
+    """
+    moved, pushed = discretise(
+        np.array([[0.0, 1.0], [stiffness, -friction]]), np.array([[0.0], [1.0]]), period
+    )
+    size = 2 + delay
+    state, drive = np.zeros((size, size)), np.zeros(size)
+    state[:2, :2] = moved
+    if delay == 0:
+        drive[:] = pushed[:, 0]
+    else:
+        state[:2, 2], drive[-1] = pushed[:, 0], 1.0
+        state[2:-1, 3:] = np.eye(delay - 1)
+    return StateSpace(state, drive, np.eye(1, size)[0], 0.0)
+
+
+def closed_loop(controller: StateSpace, plant: StateSpace) -> FloatArray:
+    """The closed loop's transition matrix; state: the plant's, then the controller's."""
+    n = plant.input.size
+    loop = np.zeros((n + controller.input.size,) * 2)
+    loop[:n, :n] = plant.state + controller.direct * np.outer(plant.input, plant.output)
+    loop[:n, n:] = np.outer(plant.input, controller.output)
+    loop[n:, :n] = np.outer(controller.input, plant.output)
+    loop[n:, n:] = controller.state
+    return loop
