@@ -21,7 +21,8 @@ from rosbags.interfaces import (
 )
 
 from maglev_model.parameters import parameter
-from maglev_monitor.bag.writer import BagError, BagWriter
+from maglev_monitor.bag.errors import BagError
+from maglev_monitor.bag.writer import BagWriter
 from maglev_node.node import MaglevNode, NodeError, NodeParameters
 from maglev_node.node import main as run_main
 from maglev_node.polling import PolledSubscription, Queues
