@@ -101,7 +101,7 @@ def test_a_killed_recorder_leaves_what_was_flushed(
     writer = open_bag(tmp_path / 'bag', compress=compress)
     write_samples(writer, run, messages)
     writer.flush()
-    writer.write('/reference', 1, messages['reference'][0])  # lost with the process
+    writer.write('/reference', [(messages['reference'][0], 1)])  # lost with the process
     counts, notes = read(tmp_path / 'bag')
     verdict = analyse(tmp_path / 'bag').result['verdict']
     writer.close()
@@ -209,7 +209,7 @@ def test_a_bag_without_a_run_is_refused(
     tmp_path: Path, run: Any, messages: dict[str, list[bytes]]
 ) -> None:
     writer = open_bag(tmp_path / 'bag')
-    writer.write('/stage/measurement', 1, messages['measurement'][0])
+    writer.write('/stage/measurement', [(messages['measurement'][0], 1)])
     writer.close()
     with pytest.raises(BagError, match='the reference never left REST'):
         analyse(tmp_path / 'bag')
@@ -217,7 +217,7 @@ def test_a_bag_without_a_run_is_refused(
 
 def test_other_messages_of_the_same_name_are_refused(tmp_path: Path) -> None:
     writer = open_bag(tmp_path / 'bag')
-    writer.write('/reference', 1, b'\x00\x01\x00\x00' + bytes(60))
+    writer.write('/reference', [(b'\x00\x01\x00\x00' + bytes(60), 1)])
     writer.close()
     with pytest.raises(BagError, match='another version of maglev_msgs'):
         read(tmp_path / 'bag')

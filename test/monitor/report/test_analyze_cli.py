@@ -83,8 +83,8 @@ def test_a_run_on_hardware_or_with_topics_lost_is_reported(
     monkeypatch.setattr(Figure, 'savefig', lambda figure, *_, **__: drawn.append(figure))
     writer = open_bag(tmp_path / 'bag')
     for key in ('reference', *kept):
-        for n in range(900):
-            writer.write(TOPICS[key][0], int(run.stamp[n]), messages[key][n])
+        stamps = run.stamp[:900].tolist()
+        writer.write(TOPICS[key][0], zip(messages[key], stamps, strict=False))
     writer.close()
     assert analyze([str(tmp_path / 'bag')]) == NOT_PASSED
     found = json.loads((tmp_path / 'metrics.json').read_text())
@@ -135,7 +135,7 @@ def test_faults_and_limits_of_the_monitor_are_in_the_bag(
         (2, 'plant', {}),
     ):
         data = encoder.diagnostic(stamp, level, name, f'{name} says', values)
-        writer.write('/diagnostics', stamp, data)
+        writer.write('/diagnostics', [(data, stamp)])
     writer.close()
     assert analyze([str(tmp_path / 'bag')]) == NOT_PASSED
     found = json.loads((tmp_path / 'metrics.json').read_text())

@@ -123,9 +123,10 @@ def run_from_json(text: str) -> RunParameters:
     Raises ParameterError for anything else.
     """
     try:
-        found = json.loads(text)
+        found: Any = json.loads(text)
     except ValueError as error:
         raise ParameterError(f'the parameters of the run are no JSON: {error}') from error
     if not isinstance(found, Mapping):
         raise ParameterError('the parameters of the run are no JSON object')
-    return build(RunParameters, {_FORMER_NAMES.get(k, k): v for k, v in found.items()})
+    named = {_FORMER_NAMES.get(str(name), name): value for name, value in found.items()}
+    return build(RunParameters, named)
