@@ -20,7 +20,7 @@ setup(
         'console_scripts': [
             'monitor = maglev_monitor.live.node:main',
             'recorder = maglev_monitor.bag.recorder:main',
-            'analyze = maglev_monitor.bag.analyze:main',
+            'analyze = maglev_monitor.report.analyze_cli:main',
         ]
     },
 )

@@ -157,5 +157,6 @@ def write_samples(writer: BagWriter, run: Run, messages: dict[str, list[bytes]])
     """All samples of a run in bursts, topic by topic, as a recorder that polls writes them."""
     for first in range(0, len(run), 40):
         for key, (topic, _) in TOPICS.items():
-            for n in range(first, min(first + 40, len(run))):
-                writer.write(topic, int(run.stamp[n]), messages[key][n])
+            part = slice(first, first + 40)
+            stamps = run.stamp[part].tolist()
+            writer.write(topic, zip(messages[key][part], stamps, strict=True))

@@ -1,4 +1,4 @@
-"""The parameter tables of the metrics and of their limits. No ROS here."""
+"""The parameters of a run: its machine, how it is measured and what it must keep. No ROS here."""
 
 from __future__ import annotations
 
@@ -7,7 +7,19 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
+from maglev_model.machine import MachineParameters
 from maglev_model.parameters import ParameterError, build, group, parameter, values
+
+RUN_KEY = 'run'
+"""Key of the value in the monitor's diagnostics that carries the parameters of the run."""
+
+FAULT_LEVEL = 2
+"""Diagnostic level from which on a node's message counts as a fault (REP-107: ERROR)."""
+
+_FORMER_NAMES = {
+    'metrics.radius': 'machine.radius',
+    'metrics.pole_pitch': 'machine.pole_pitch',
+}
 
 NOT_CHECKED = -1.0
 """A limit below zero is not checked."""
@@ -36,12 +48,6 @@ class MetricsParameters:
     sample_time: float = parameter(
         1e-3, unit='s', lower=1e-5, upper=1.0, description='stage time from sample to sample'
     )
-    radius: float = parameter(
-        0.397, unit='m', lower=1e-3, upper=10.0, description='r, platen centre to mover centre'
-    )
-    pole_pitch: float = parameter(
-        0.05715, unit='m', lower=1e-3, upper=1.0, description='tau, for the phase currents'
-    )
     peak_current: float = parameter(
         7.0, unit='A', lower=0.0, upper=100.0, description="the amplifiers' peak, for the report"
     )
@@ -67,7 +73,7 @@ class MetricsParameters:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Limits:
+class RunLimits:
     """What a run must keep to pass."""
 
     max_mean_error: tuple[float, ...] = _axis_limits('mean |e| over the tracking window')
@@ -89,33 +95,38 @@ class Limits:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class RunParameters:
-    """What a run is called, how it is measured and what it must keep."""
+    """What a run is called, its machine, how it is measured and what it must keep."""
 
     scenario: str = parameter('', description='name of the scenario, for the metrics')
     stage: str = parameter('', description='the stage that runs: plant or hw_bridge')
     mode: str = parameter('', description='lockstep or realtime')
+    machine: MachineParameters = group(MachineParameters)
     metrics: MetricsParameters = group(MetricsParameters)
-    limits: Limits = group(Limits)
+    limits: RunLimits = group(RunLimits)
 
 
 def run_to_json(run: RunParameters) -> str:
     """The table as one line of JSON, as the monitor leaves it in its diagnostics for the bag."""
-    plain = {field.name: getattr(run, field.name) for field in dataclasses.fields(RunParameters)}
     named: dict[str, object] = {}
-    for name, value in plain.items():
+    for field in dataclasses.fields(RunParameters):
+        value = getattr(run, field.name)
         if dataclasses.is_dataclass(value):
-            named.update({f'{name}.{key}': inner for key, inner in values(value).items()})
+            named.update({f'{field.name}.{key}': inner for key, inner in values(value).items()})
         else:
-            named[name] = value
+            named[field.name] = value
     return json.dumps(named, separators=(',', ':'))
 
 
 def run_from_json(text: str) -> RunParameters:
-    """Invert :func:`run_to_json`. Raises ParameterError for anything else."""
+    """Invert :func:`run_to_json`, also for bags in which parameters had their former names.
+
+    Raises ParameterError for anything else.
+    """
     try:
-        found = json.loads(text)
+        found: Any = json.loads(text)
     except ValueError as error:
         raise ParameterError(f'the parameters of the run are no JSON: {error}') from error
     if not isinstance(found, Mapping):
         raise ParameterError('the parameters of the run are no JSON object')
-    return build(RunParameters, found)
+    named = {_FORMER_NAMES.get(str(name), name): value for name, value in found.items()}
+    return build(RunParameters, named)

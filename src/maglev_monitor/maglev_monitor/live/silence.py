@@ -18,7 +18,7 @@ class Silence(NamedTuple):
     duration: float
 
 
-class Watch:
+class SilenceWatch:
     """Keeps when each topic last brought a new sample.
 
     :param now: time on a steady clock [s].

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from maglev_model.phases import Phase
+from maglev_monitor.metrics.decoding import TOPIC_TYPES, Records, decode
 from maglev_monitor.metrics.joiner import Joiner
-from maglev_monitor.metrics.samples import TOPIC_TYPES, Records, decode
 
 KEYS = tuple(TOPIC_TYPES)
 

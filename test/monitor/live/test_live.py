@@ -7,16 +7,16 @@ import pytest
 
 from maglev_model.phases import Phase
 from maglev_monitor.live.progress import Progress
-from maglev_monitor.live.watch import Watch
+from maglev_monitor.live.silence import SilenceWatch
 from maglev_monitor.metrics.joiner import ROW
-from maglev_monitor.metrics.settings import MetricsParameters
-from maglev_monitor.report.units import angle_or_length, micro, seconds
+from maglev_monitor.metrics.readable import angle_or_length, micro, seconds
+from maglev_monitor.metrics.run_parameters import RunParameters
 
 ALL = {'measurement': 1, 'currents': 1, 'reference': 1}
 
 
 def test_the_first_to_fall_silent_is_blamed() -> None:
-    watch = Watch(0.0)
+    watch = SilenceWatch(0.0)
     watch.update({'measurement': 10, 'currents': 10, 'reference': 50}, 1.0)
     watch.update({'measurement': 90, 'currents': 90, 'reference': 90}, 2.0)
     watch.update({'measurement': 95, 'currents': 95, 'reference': 90}, 3.0)
@@ -26,14 +26,14 @@ def test_the_first_to_fall_silent_is_blamed() -> None:
 
 
 def test_a_node_that_is_gone_is_named() -> None:
-    watch = Watch(0.0)
+    watch = SilenceWatch(0.0)
     assert watch.blame({**ALL, 'currents': 0}, 1.0) == 'the controller is not running'
     missing = watch.blame({**ALL, 'currents': 0, 'measurement': 0}, 1.0)
     assert missing == 'the stage and the controller are not running'
 
 
 def test_a_node_that_never_spoke_is_named() -> None:
-    watch = Watch(0.0)
+    watch = SilenceWatch(0.0)
     watch.update({'measurement': 0, 'currents': -1, 'reference': 3}, 1.0)
     assert watch.blame(ALL, 2.0) == 'the controller never published a sample'
 
@@ -43,7 +43,7 @@ def test_progress_line() -> None:
     rows['has_reference'] = rows['has_plant'] = True
     rows['state'][:, 0] = 0.025 + np.tile([3e-6, -3e-6], 25)
     rows['reference'][:, 0] = 0.025
-    progress = Progress(MetricsParameters())
+    progress = Progress(RunParameters())
     progress.add(rows)
     progress.line(1000, Phase.TRACK, 10.0)
     line = progress.line(4000, Phase.TRACK, 11.0)
@@ -56,7 +56,7 @@ def test_progress_line() -> None:
 
 
 def test_progress_without_a_run_says_nothing_wrong() -> None:
-    assert Progress(MetricsParameters()).line(-1, Phase.REST, 0.0).endswith('theta –')
+    assert Progress(RunParameters()).line(-1, Phase.REST, 0.0).endswith('theta –')
 
 
 @pytest.mark.parametrize(

@@ -10,14 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from maglev_model.phases import Phase
-from maglev_monitor.metrics.samples import (
+from maglev_monitor.metrics.decoding import (
     KEY_OF_MESSAGE_TYPE,
     TOPIC_TYPES,
     DecodeError,
     decode,
-    outputs_from_gaps,
     stamps,
 )
+from maglev_monitor.metrics.derived import positions
+from maglev_monitor.metrics.joiner import ROW
 
 KEYS = tuple(TOPIC_TYPES)
 
@@ -106,5 +107,7 @@ def test_outputs_invert_the_papers_5(y: float, phi: float, theta: float, radius:
         y + radius * np.sin(phi),
         y - radius * np.sin(theta),
     ]
-    found = outputs_from_gaps(np.array([gap]), [0.01], [-0.02], radius)
+    rows = np.zeros(1, ROW)
+    rows['has_measurement'], rows['gap'], rows['x'], rows['z'] = True, gap, 0.01, -0.02
+    found = positions(rows, radius)[:, 1]
     np.testing.assert_allclose(found, [[y, 0.01, -0.02, phi, theta]], rtol=0.0, atol=1e-12)

@@ -14,19 +14,19 @@ from hypothesis import strategies as st
 from maglev_model.axes import AXES
 from maglev_model.parameters import build
 from maglev_model.phases import Phase
+from maglev_monitor.metrics.decoding import Records, decode
+from maglev_monitor.metrics.derived import phase_currents
 from maglev_monitor.metrics.joiner import ROW, Joiner
-from maglev_monitor.metrics.run_metrics import RunMetrics, phase_currents
-from maglev_monitor.metrics.samples import Records, decode
-from maglev_monitor.metrics.settings import MetricsParameters, RunParameters
+from maglev_monitor.metrics.run_metrics import RunMetrics
+from maglev_monitor.metrics.run_parameters import MetricsParameters, RunParameters
 from maglev_monitor.metrics.step_response import StepTracker
 
-SETTINGS = MetricsParameters()
 RUN = RunParameters()
 
 
 def figures(records: dict[str, Records], run: RunParameters = RUN, burst: int = 10_000) -> Any:
     """The figures of decoded records, fed in bursts."""
-    metrics, joiner = RunMetrics(run.metrics), Joiner()
+    metrics, joiner = RunMetrics(run), Joiner()
     longest = max(len(part) for part in records.values())
     for first in range(0, longest, burst):
         for key, part in records.items():
@@ -35,7 +35,7 @@ def figures(records: dict[str, Records], run: RunParameters = RUN, burst: int = 
             metrics.add(block)
     for block in joiner.finish():
         metrics.add(block)
-    return metrics.result(run)
+    return metrics.result()
 
 
 @pytest.fixture(scope='module')
@@ -144,12 +144,12 @@ def test_a_loss_of_whole_blocks_is_counted(records: dict[str, Records]) -> None:
         key: part[(part['sequence'] < 100) | (part['sequence'] >= 1050)]
         for key, part in records.items()
     }
-    metrics, joiner = RunMetrics(SETTINGS), Joiner(block=50)
+    metrics, joiner = RunMetrics(RUN), Joiner(block=50)
     for key, part in kept.items():
         joiner.add(key, part)
     for block in joiner.finish():
         metrics.add(block)
-    found = metrics.result(RUN)
+    found = metrics.result()
     assert found['missing_by_topic'] == dict.fromkeys(kept, 950)
     assert found['run_samples'] == 1200 - 60 - 60
 
@@ -182,13 +182,13 @@ def test_a_fault_fails_the_run_unless_it_comes_after_the_end(
     run: Any, records: dict[str, Records]
 ) -> None:
     for sequence, verdict in ((500, 'fail'), (1199, 'pass')):
-        metrics, joiner = RunMetrics(SETTINGS), Joiner()
+        metrics, joiner = RunMetrics(RUN), Joiner()
         metrics.add_fault(int(run.stamp[sequence]), 'plant', 'spent')
         for key, part in records.items():
             joiner.add(key, part)
         for block in joiner.finish():
             metrics.add(block)
-        found = metrics.result(RUN)
+        found = metrics.result()
         assert found['verdict'] == verdict
         assert (found['reasons'] == ['fault in plant: spent']) == (verdict == 'fail')
 

@@ -8,9 +8,9 @@ from typing import Any
 
 from maglev_model.axes import AXES
 from maglev_monitor.bag.analysis import Analysis
-from maglev_monitor.report.page import bullets, header, page, picture, table, write_page
-from maglev_monitor.report.plots import plots
-from maglev_monitor.report.units import angle_or_length, micro, number, seconds
+from maglev_monitor.metrics.readable import angle_or_length, micro, number, seconds
+from maglev_monitor.report.page import bullets, header, html_table, page, picture, write_page
+from maglev_monitor.report.run_plots import plots
 
 
 def write_report(path: Path, analysis: Analysis) -> None:
@@ -72,7 +72,7 @@ def _tracking_table(result: Mapping[str, Any]) -> str:
         return ''
     names = ('mean_abs_error', 'rms_error', 'max_abs_error')
     rows = [[axis, *(micro(axis, axes[axis][name]) for name in names)] for axis in AXES]
-    return '<h2>Tracking errors</h2>' + table(['axis', 'mean |e|', 'rms e', 'max |e|'], rows)
+    return '<h2>Tracking errors</h2>' + html_table(['axis', 'mean |e|', 'rms e', 'max |e|'], rows)
 
 
 def _step_table(result: Mapping[str, Any]) -> str:
@@ -89,7 +89,7 @@ def _step_table(result: Mapping[str, Any]) -> str:
     ]
     if not rows:
         return ''
-    return '<h2>Steps</h2>' + table(['axis', 'from', 'to', 'overshoot', 't_s', 't_enc'], rows)
+    return '<h2>Steps</h2>' + html_table(['axis', 'from', 'to', 'overshoot', 't_s', 't_enc'], rows)
 
 
 def _limits_table(limits: Mapping[str, Any]) -> str:
@@ -102,4 +102,4 @@ def _limits_table(limits: Mapping[str, Any]) -> str:
         else:
             shown = number(value)
         rows.append([name.replace('_', ' '), shown])
-    return '<h2>Limits</h2>' + table(['limit', 'value'], rows) if rows else ''
+    return '<h2>Limits</h2>' + html_table(['limit', 'value'], rows) if rows else ''

@@ -9,7 +9,7 @@ here.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,26 +144,6 @@ def stamps(records: Records) -> NDArray[np.int64]:
     seconds = records['seconds'].astype(np.int64)
     nanoseconds: NDArray[np.int64] = seconds * 1_000_000_000 + records['nanoseconds']
     return nanoseconds
-
-
-def outputs_from_gaps(
-    gap: NDArray[np.float64], x: Any, z: Any, radius: float
-) -> NDArray[np.float64]:
-    """Invert (5): the five outputs from the encoders.
-
-    :param gap: air gaps of motors 1..4 [m], shape (n, 4).
-    :param x: displacement along X [m], shape (n,).
-    :param z: displacement along Z [m], shape (n,).
-    :param radius: r, centre of the platen to centre of a mover [m].
-    :returns: y, x, z [m], phi, theta [rad], shape (n, 5).
-    """
-    outputs = np.empty((len(gap), 5))
-    outputs[:, 0] = gap.mean(axis=1)
-    outputs[:, 1] = x
-    outputs[:, 2] = z
-    sines = (gap[:, (2, 1)] - gap[:, (0, 3)]) / (2.0 * radius)
-    outputs[:, 3:] = np.arcsin(np.clip(sines, -1.0, 1.0))
-    return outputs
 
 
 def _frame_id_length(key: str, message: bytes) -> int:

@@ -13,25 +13,26 @@ from made_up_run import TOPICS, open_bag, write_samples
 from matplotlib.figure import Figure
 
 from maglev_model.parameters import ParameterError, build
-from maglev_monitor.bag.analysis import analyse, write_metrics
-from maglev_monitor.bag.analyze import BAD_BAG, NOT_PASSED, PASS, analyze
+from maglev_monitor.bag.analysis import analyse
+from maglev_monitor.metrics.decoding import decode
 from maglev_monitor.metrics.joiner import Joiner
+from maglev_monitor.metrics.result_file import write_metrics
 from maglev_monitor.metrics.run_metrics import RunMetrics
-from maglev_monitor.metrics.samples import decode
-from maglev_monitor.metrics.settings import RunParameters, run_from_json, run_to_json
-from maglev_monitor.report import report
-from maglev_monitor.report.table import table
+from maglev_monitor.metrics.run_parameters import RunParameters, run_from_json, run_to_json
+from maglev_monitor.report import run_report
+from maglev_monitor.report.analyze_cli import BAD_BAG, NOT_PASSED, PASS, analyze
+from maglev_monitor.report.terminal import as_text
 
 
 @pytest.fixture
 def no_plots(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures take seconds; one test draws them all."""
-    monkeypatch.setattr(report, 'plots', lambda _: [])
+    monkeypatch.setattr(run_report, 'plots', lambda _: [])
 
 
 def test_live_and_bag_agree_exactly(bag: Path, run: Any, messages: dict[str, list[bytes]]) -> None:
     parameters = RunParameters(scenario='made_up', stage='plant', mode='lockstep')
-    metrics, joiner = RunMetrics(parameters.metrics), Joiner()
+    metrics, joiner = RunMetrics(parameters), Joiner()
     for first in range(0, len(run), 13):
         for key, part in messages.items():
             joiner.add(key, decode(key, part[first : first + 13]))
@@ -39,7 +40,7 @@ def test_live_and_bag_agree_exactly(bag: Path, run: Any, messages: dict[str, lis
             metrics.add(block)
     for block in joiner.finish():
         metrics.add(block)
-    assert json.dumps(metrics.result(parameters)) == json.dumps(analyse(bag).result)
+    assert json.dumps(metrics.result()) == json.dumps(analyse(bag).result)
 
 
 def test_report_is_self_contained(bag: Path, tmp_path: Path, capsys: Any) -> None:
@@ -55,7 +56,7 @@ def test_report_is_self_contained(bag: Path, tmp_path: Path, capsys: Any) -> Non
     assert 'made_up' in page
     printed = capsys.readouterr().out
     found = json.loads((tmp_path / 'metrics.json').read_text())
-    assert table(found) in printed
+    assert as_text(found) in printed
     assert found['scenario'] == 'made_up'
     assert not list(tmp_path.glob('*.tmp'))
 
@@ -82,8 +83,8 @@ def test_a_run_on_hardware_or_with_topics_lost_is_reported(
     monkeypatch.setattr(Figure, 'savefig', lambda figure, *_, **__: drawn.append(figure))
     writer = open_bag(tmp_path / 'bag')
     for key in ('reference', *kept):
-        for n in range(900):
-            writer.write(TOPICS[key][0], int(run.stamp[n]), messages[key][n])
+        stamps = run.stamp[:900].tolist()
+        writer.write(TOPICS[key][0], zip(messages[key], stamps, strict=False))
     writer.close()
     assert analyze([str(tmp_path / 'bag')]) == NOT_PASSED
     found = json.loads((tmp_path / 'metrics.json').read_text())
@@ -95,7 +96,7 @@ def test_a_run_on_hardware_or_with_topics_lost_is_reported(
 
 @pytest.mark.usefixtures('no_plots')
 def test_a_cut_off_bag_is_reported_and_says_so(bag: Path, tmp_path: Path, capsys: Any) -> None:
-    whole = (bag / 'bag.mcap').read_bytes()
+    whole = (bag / 'bag_0.mcap').read_bytes()
     cut = tmp_path / 'bag.mcap'
     cut.write_bytes(whole[:-2000])
     assert analyze([str(cut), '--out', str(tmp_path / 'out')]) == BAD_BAG
@@ -134,7 +135,7 @@ def test_faults_and_limits_of_the_monitor_are_in_the_bag(
         (2, 'plant', {}),
     ):
         data = encoder.diagnostic(stamp, level, name, f'{name} says', values)
-        writer.write('/diagnostics', stamp, data)
+        writer.write('/diagnostics', [(data, stamp)])
     writer.close()
     assert analyze([str(tmp_path / 'bag')]) == NOT_PASSED
     found = json.loads((tmp_path / 'metrics.json').read_text())
@@ -147,7 +148,7 @@ def test_faults_and_limits_of_the_monitor_are_in_the_bag(
 def test_parameters_survive_the_bag() -> None:
     parameters = build(
         RunParameters,
-        {'scenario': 'a', 'metrics.radius': 0.4, 'limits.max_error': (1.0, 2.0, 3.0, 4.0, 5.0)},
+        {'scenario': 'a', 'machine.radius': 0.4, 'limits.max_error': (1.0, 2.0, 3.0, 4.0, 5.0)},
     )
     assert run_from_json(run_to_json(parameters)) == parameters
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 
-class Series:
+class Envelope:
     """Columns over sample numbers; when the bins are full, neighbours merge and bins are twice as
     wide.
 

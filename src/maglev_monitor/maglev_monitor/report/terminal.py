@@ -6,10 +6,10 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from maglev_model.axes import AXES
-from maglev_monitor.report.units import angle_or_length, micro, number, seconds
+from maglev_monitor.metrics.readable import angle_or_length, micro, number, seconds
 
 
-def table(found: Mapping[str, Any]) -> str:
+def as_text(found: Mapping[str, Any]) -> str:
     """The content of ``metrics.json`` as lines of text."""
     lines = [_title(found), *_tracking_lines(found), *_step_lines(found), *_other_lines(found)]
     lines.append(f'verdict: {found["verdict"]}')

@@ -15,6 +15,7 @@ import made_up_run
 import numpy as np
 import pytest
 from made_up_run import MESSAGES, TOPICS, open_bag, write_samples
+from mcap.writer import MCAP0_MAGIC
 from rosbags.interfaces import (
     Qos,
     QosDurability,
@@ -26,9 +27,10 @@ from rosbags.interfaces import (
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 
 from maglev_monitor.bag.analysis import analyse
-from maglev_monitor.bag.mcap_file import MAGIC, McapFile
+from maglev_monitor.bag.errors import BagError
+from maglev_monitor.bag.mcap_file import McapFile
 from maglev_monitor.bag.reader import Bag
-from maglev_monitor.bag.writer import BagError, BagWriter
+from maglev_monitor.bag.writer import BagWriter
 
 QOS = Qos(
     QosHistory.KEEP_LAST,
@@ -99,7 +101,7 @@ def test_a_killed_recorder_leaves_what_was_flushed(
     writer = open_bag(tmp_path / 'bag', compress=compress)
     write_samples(writer, run, messages)
     writer.flush()
-    writer.write('/reference', 1, messages['reference'][0])  # lost with the process
+    writer.write('/reference', [(messages['reference'][0], 1)])  # lost with the process
     counts, notes = read(tmp_path / 'bag')
     verdict = analyse(tmp_path / 'bag').result['verdict']
     writer.close()
@@ -116,7 +118,7 @@ def test_a_file_cut_anywhere_gives_its_front(
     writer = open_bag(tmp_path / 'bag')
     write_samples(writer, run, messages)
     writer.close()
-    whole = (tmp_path / 'bag' / 'bag.mcap').read_bytes()
+    whole = (tmp_path / 'bag' / 'bag_0.mcap').read_bytes()
     cut = tmp_path / 'cut.mcap'
     cut.write_bytes(whole[: int(share * len(whole))])
     counts, notes = read(cut)
@@ -139,7 +141,7 @@ def test_a_damaged_chunk_ends_the_reading(
     writer = open_bag(tmp_path / 'bag', compress=True)
     write_samples(writer, run, messages)
     writer.flush()
-    file = tmp_path / 'bag' / 'bag.mcap'
+    file = tmp_path / 'bag' / 'bag_0.mcap'
     size = file.stat().st_size
     write_samples(writer, run, messages)
     writer.close()
@@ -160,7 +162,7 @@ def test_a_bag_without_metadata_is_read(bag: Path, tmp_path: Path, run: Any) -> 
     assert 'no metadata.yaml' in notes[0]
 
 
-@pytest.mark.parametrize('place', ['bag', 'bag/bag.mcap', 'bag/metadata.yaml', '.'])
+@pytest.mark.parametrize('place', ['bag', 'bag/bag_0.mcap', 'bag/metadata.yaml', '.'])
 def test_a_bag_is_found_by_any_of_its_names(place: str, bag: Path, run: Any) -> None:
     counts, notes = read(bag.parent / place)
     assert counts['currents'] == len(run)
@@ -185,7 +187,7 @@ def test_sqlite_bags_are_read(
         ('empty.mcap', b'', 'is no mcap file'),
         ('text.mcap', b'not a bag at all', 'is no mcap file'),
         ('text.txt', b'not a bag at all', 'is no bag'),
-        ('head.mcap', MAGIC, 'holds no message'),
+        ('head.mcap', MCAP0_MAGIC, 'holds no message'),
     ],
 )
 def test_what_is_no_bag_is_refused(
@@ -207,7 +209,7 @@ def test_a_bag_without_a_run_is_refused(
     tmp_path: Path, run: Any, messages: dict[str, list[bytes]]
 ) -> None:
     writer = open_bag(tmp_path / 'bag')
-    writer.write('/stage/measurement', 1, messages['measurement'][0])
+    writer.write('/stage/measurement', [(messages['measurement'][0], 1)])
     writer.close()
     with pytest.raises(BagError, match='the reference never left REST'):
         analyse(tmp_path / 'bag')
@@ -215,17 +217,17 @@ def test_a_bag_without_a_run_is_refused(
 
 def test_other_messages_of_the_same_name_are_refused(tmp_path: Path) -> None:
     writer = open_bag(tmp_path / 'bag')
-    writer.write('/reference', 1, b'\x00\x01\x00\x00' + bytes(60))
+    writer.write('/reference', [(b'\x00\x01\x00\x00' + bytes(60), 1)])
     writer.close()
     with pytest.raises(BagError, match='another version of maglev_msgs'):
         read(tmp_path / 'bag')
 
 
 def test_an_existing_bag_is_not_touched(bag: Path) -> None:
-    before = (bag / 'bag.mcap').stat()
+    before = (bag / 'bag_0.mcap').stat()
     with pytest.raises(BagError, match='exists already'):
         open_bag(bag)
-    assert (bag / 'bag.mcap').stat().st_mtime_ns == before.st_mtime_ns
+    assert (bag / 'bag_0.mcap').stat().st_mtime_ns == before.st_mtime_ns
 
 
 def test_a_place_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
@@ -262,7 +264,7 @@ import resource, sys
 sys.path.insert(0, sys.argv[1].rpartition('/')[0])
 import made_up_run
 from pathlib import Path
-from maglev_monitor.bag.writer import BagError
+from maglev_monitor.bag.errors import BagError
 run = made_up_run.make_run(1200)
 encoder = made_up_run.Encoder()
 messages = {key: [encoder.message(run, key, n) for n in range(1200)] for key in made_up_run.TOPICS}
@@ -293,8 +295,8 @@ def test_a_file_that_may_not_grow_is_finished_as_it_was(tmp_path: Path) -> None:
 
 
 def test_reading_knows_a_whole_file(bag: Path) -> None:
-    file = McapFile(bag / 'bag.mcap')
-    assert sum(len(chunk) for chunk in file.chunks()) == 6001
+    file = McapFile(bag / 'bag_0.mcap')
+    assert sum(len(topic.data) for chunk in file.chunks() for topic in chunk) == 6001
     assert file.complete
     assert file.damage == ''
 

@@ -7,9 +7,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from maglev_monitor.bag.analysis import Analysis, analyse, write_metrics
-from maglev_monitor.bag.writer import BagError
-from maglev_monitor.report.table import table
+from maglev_monitor.bag.analysis import Analysis, analyse
+from maglev_monitor.bag.errors import BagError
+from maglev_monitor.metrics.result_file import write_metrics
+from maglev_monitor.report.terminal import as_text
 
 PASS, NOT_PASSED, BAD_BAG = 0, 1, 2
 
@@ -26,7 +27,7 @@ def analyze(arguments: Sequence[str] | None = None) -> int:
     except BagError as error:
         print(f'analyze: error: {error}', file=sys.stderr)
         return BAD_BAG
-    print(table(analysis.result))
+    print(as_text(analysis.result))
     for note in analysis.notes:
         print(f'analyze: {note}', file=sys.stderr)
     folder = options.out or _beside(options.bag)
@@ -68,7 +69,7 @@ def _beside(bag: Path) -> Path:
 
 
 def _write(folder: Path, analysis: Analysis) -> None:
-    from maglev_monitor.report.report import write_report  # matplotlib takes a second to load
+    from maglev_monitor.report.run_report import write_report  # matplotlib takes a second to load
 
     write_report(folder / 'report.html', analysis)
     if not (folder / 'metrics.json').exists():

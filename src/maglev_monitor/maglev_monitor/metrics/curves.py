@@ -1,4 +1,4 @@
-"""What the report draws, gathered from the blocks of a run in bounded memory. No ROS here."""
+"""The curves of a run, gathered from its blocks in bounded memory. No ROS here."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maglev_model.phases import Phase
-from maglev_monitor.metrics.run_metrics import phase_currents, positions
-from maglev_monitor.metrics.samples import Records
-from maglev_monitor.metrics.settings import MetricsParameters
-from maglev_monitor.report.envelope import Series
+from maglev_monitor.metrics.decoding import Records
+from maglev_monitor.metrics.derived import SOURCES, phase_currents, positions
+from maglev_monitor.metrics.envelope import Envelope
+from maglev_monitor.metrics.run_parameters import RunParameters
 
 FloatArray = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ COLUMNS = {
     'phase': slice(42, 43),
     'saturated': slice(43, 44),
 }
-"""Columns of a run's series. Errors are against the target in a STEP, against the reference
+"""Columns of a run's curves. Errors are against the target in a STEP, against the reference
 otherwise; ``phase_current`` is the largest magnitude among a motor's three phases [A], ``tick`` the
 wall-clock time since the sample before [s]."""
 
@@ -36,8 +36,8 @@ _MOST_STEPS = 40
 _STEP_BINS = 1200
 
 
-class StepSeries(Series):
-    """The series of one step, with where it started and what it aimed at."""
+class StepCurves(Envelope):
+    """The curves of one step, with where it started and what it aimed at."""
 
     def __init__(self, start: FloatArray, target: FloatArray) -> None:
         super().__init__(_width(), _STEP_BINS)
@@ -45,21 +45,21 @@ class StepSeries(Series):
         self.target = target
 
 
-class RunSeries:
+class RunCurves:
     """Takes the rows that :meth:`.RunMetrics.add` returns, in order.
 
-    ``run`` is the whole run, ``steps`` each step, ``tail`` the last tracking samples one by one:
+    ``whole_run`` is all of it, ``steps`` each step, ``tail`` the last tracking samples one by one:
     sample numbers, shape (n,), and columns, shape (n, :data:`COLUMNS`).
     """
 
-    def __init__(self, settings: MetricsParameters) -> None:
-        self.run = Series(_width())
-        self.steps: list[StepSeries] = []
-        self._settings = settings
+    def __init__(self, run: RunParameters) -> None:
+        self.whole_run = Envelope(_width())
+        self.steps: list[StepCurves] = []
+        self._machine = run.machine
         self._tail_parts: list[tuple[NDArray[np.int64], FloatArray]] = []
         self._segment: int | None = None
         self._target: FloatArray | None = None
-        self._step: StepSeries | None = None
+        self._step: StepCurves | None = None
         self._previous = (-1, 0)  # sequence and stamp of the last measurement
 
     def add(self, rows: Records) -> None:
@@ -67,7 +67,7 @@ class RunSeries:
         if not len(rows):
             return
         values = self._values(rows)
-        self.run.add(rows['sequence'], values)
+        self.whole_run.add(rows['sequence'], values)
         self._add_tail(rows, values)
         known = np.flatnonzero(rows['has_reference'])
         changes = np.flatnonzero(np.diff(rows['segment'][known])) + 1
@@ -91,8 +91,8 @@ class RunSeries:
         values[referenced, COLUMNS['phase']] = rows['phase'][referenced][:, None]
         wanted = np.where((rows['phase'] == Phase.STEP)[:, None], rows['target'], rows['reference'])
         wanted[~referenced] = np.nan
-        position = positions(rows, self._settings.radius)
-        for index, source in enumerate(('true', 'measured')):
+        position = positions(rows, self._machine.radius)
+        for index, source in enumerate(SOURCES):
             values[:, COLUMNS[source]] = position[:, index]
             values[:, COLUMNS[f'{source}_error']] = position[:, index] - wanted
         driven = rows['has_currents']
@@ -100,7 +100,7 @@ class RunSeries:
             values[driven, COLUMNS[name]] = rows[name][driven]
         measured = rows['has_measurement']
         both = driven & measured
-        currents = np.abs(phase_currents(rows[both], self._settings.pole_pitch)).max(axis=2)
+        currents = np.abs(phase_currents(rows[both], self._machine.pole_pitch)).max(axis=2)
         values[both, COLUMNS['phase_current']] = currents
         plant = rows['has_plant']
         values[plant, COLUMNS['thermal_load']] = rows['thermal_load'][plant]
@@ -132,7 +132,7 @@ class RunSeries:
             start = self._target if self._target is not None else np.array(rows['reference'][0])
             self._segment, self._target, self._step = segment, target, None
             if rows['phase'][0] == Phase.STEP and len(self.steps) < _MOST_STEPS:
-                self._step = StepSeries(start, target)
+                self._step = StepCurves(start, target)
                 self.steps.append(self._step)
         if self._step is not None:
             self._step.add(rows['sequence'], values)

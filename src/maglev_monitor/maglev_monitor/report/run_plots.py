@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from maglev_model.axes import AXES
 from maglev_model.phases import Phase
 from maglev_monitor.bag.analysis import Analysis
-from maglev_monitor.report.curves import COLUMNS, StepSeries
+from maglev_monitor.metrics.curves import COLUMNS, StepCurves
 from maglev_monitor.report.drawing import (
     ERROR,
     FLOOR,
@@ -48,19 +48,19 @@ _Made = tuple[str, str, Figure] | None
 
 
 def _overview(analysis: Analysis) -> _Made:
-    series, source = analysis.series.run, analysis.result['error_source']
-    time = _time(analysis, series.sequence)
+    whole, source = analysis.curves.whole_run, analysis.result['error_source']
+    time = _time(analysis, whole.sequence)
     figure, panels = plt.subplots(5, 2, figsize=(11.0, 10.5), sharex=True, squeeze=False)
     for index, axis in enumerate(AXES):
         left, right = panels[index]
         milli, micro = units(axis)
         _shade(left, analysis, time)
         _shade(right, analysis, time)
-        envelope(left, time, series, column(source, index), 1e3, POSITION, source)
-        reference = 1e3 * series.first[:, column('reference', index)]
+        envelope(left, time, whole, column(source, index), 1e3, POSITION, source)
+        reference = 1e3 * whole.first[:, column('reference', index)]
         left.plot(time, reference, color=REFERENCE, lw=0.8, ls='--', label='reference')
         left.set(ylabel=f'{axis} [{milli}]', title=TITLES[axis])
-        error = 1e6 * np.abs(extremes(series, column(f'{source}_error', index))).max(axis=0)
+        error = 1e6 * np.abs(extremes(whole, column(f'{source}_error', index))).max(axis=0)
         right.fill_between(time, FLOOR, np.maximum(error, FLOOR), color=ERROR, lw=0.0, alpha=0.85)
         top = max(2.0 * float(np.nanmax(error, initial=0.0)), 10.0)
         right.set(ylabel=f'|e| [{micro}]', title=f'error of {axis}')
@@ -77,7 +77,7 @@ def _overview(analysis: Analysis) -> _Made:
 
 
 def _tracking(analysis: Analysis) -> _Made:
-    sequence, values = analysis.series.tail
+    sequence, values = analysis.curves.tail
     if not len(sequence):
         return None
     source = analysis.result['error_source']
@@ -117,7 +117,7 @@ def _centred(panel: Axes, reference: FloatArray) -> FloatArray:
 def _steps(analysis: Analysis) -> _Made:
     stepped = [
         (index, step)
-        for step in analysis.series.steps
+        for step in analysis.curves.steps
         for index in range(5)
         if abs(step.target[index] - step.start[index]) > MOVES
     ]
@@ -137,7 +137,7 @@ def _steps(analysis: Analysis) -> _Made:
 
 
 def _step_panels(
-    analysis: Analysis, left: Axes, right: Axes, index: int, steps: list[StepSeries]
+    analysis: Analysis, left: Axes, right: Axes, index: int, steps: list[StepCurves]
 ) -> None:
     axis, source = AXES[index], analysis.result['error_source']
     milli, micro = units(axis)
@@ -160,10 +160,10 @@ def _step_panels(
 
 
 def _path(analysis: Analysis) -> _Made:
-    series, source = analysis.series.run, analysis.result['error_source']
-    tracked = series.first[:, COLUMNS['phase']][:, 0] == Phase.TRACK
-    points = 1e3 * series.first[tracked][:, COLUMNS[source]][:, :3]
-    wanted = 1e3 * series.first[tracked][:, COLUMNS['reference']][:, :3]
+    whole, source = analysis.curves.whole_run, analysis.result['error_source']
+    tracked = whole.first[:, COLUMNS['phase']][:, 0] == Phase.TRACK
+    points = 1e3 * whole.first[tracked][:, COLUMNS[source]][:, :3]
+    wanted = 1e3 * whole.first[tracked][:, COLUMNS['reference']][:, :3]
     if not len(points) or np.count_nonzero(np.ptp(wanted, axis=0) > 1e3 * MOVES) < 2:
         return None
     figure = plt.figure(figsize=(7.5, 6.0))
@@ -186,10 +186,10 @@ def _path(analysis: Analysis) -> _Made:
 
 
 def _currents(analysis: Analysis) -> _Made:
-    series, settings = analysis.series.run, analysis.run.metrics
-    if np.isnan(series.high[:, COLUMNS['phase_current']]).all():
+    whole, settings = analysis.curves.whole_run, analysis.run.metrics
+    if np.isnan(whole.high[:, COLUMNS['phase_current']]).all():
         return None
-    time = _time(analysis, series.sequence)
+    time = _time(analysis, whole.sequence)
     figure, panels = plt.subplots(4, 2, figsize=(11.0, 8.4), sharex=True, squeeze=False)
     for motor in range(4):
         left, right = panels[motor]
@@ -197,15 +197,15 @@ def _currents(analysis: Analysis) -> _Made:
             ('direct_current', POSITION, 'i_d'),
             ('quadrature_current', SECOND, 'i_q'),
         ):
-            envelope(left, time, series, COLUMNS[name].start + motor, 1.0, colour, label)
-        high = series.high[:, COLUMNS['phase_current'].start + motor]
+            envelope(left, time, whole, COLUMNS[name].start + motor, 1.0, colour, label)
+        high = whole.high[:, COLUMNS['phase_current'].start + motor]
         right.fill_between(
             time, 0.0, high, color=POSITION, lw=0.0, alpha=0.8, label='|phase current|'
         )
         right.axhline(settings.peak_current, color=ERROR, lw=0.9, label='peak')
         right.axhline(settings.continuous_current, color=ERROR, lw=0.9, ls=':', label='continuous')
         right.set_ylim(0.0, 1.1 * max(settings.peak_current, float(np.nanmax(high, initial=0.0))))
-        thermal = series.high[:, COLUMNS['thermal_load'].start + motor]
+        thermal = whole.high[:, COLUMNS['thermal_load'].start + motor]
         title = f'motor {motor + 1}'
         if np.nanmax(thermal, initial=0.0) > 0.0:
             title += f' — thermal budget used up to {100.0 * np.nanmax(thermal):.0f} %'
@@ -223,12 +223,12 @@ def _currents(analysis: Analysis) -> _Made:
 
 
 def _timing(analysis: Analysis) -> _Made:
-    series = analysis.series.run
-    ticks = 1e3 * series.high[:, COLUMNS['tick']][:, 0]
+    whole = analysis.curves.whole_run
+    ticks = 1e3 * whole.high[:, COLUMNS['tick']][:, 0]
     histogram = analysis.tick_histogram
     if np.isnan(ticks).all() or not histogram.any():
         return None
-    time = _time(analysis, series.sequence)
+    time = _time(analysis, whole.sequence)
     figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 2.9))
     left.plot(time, ticks, color=POSITION, lw=0.6)
     left.set(xlabel='time since lift-off [s]', ylabel='[ms]', title='longest tick of each instant')
@@ -248,14 +248,14 @@ def _timing(analysis: Analysis) -> _Made:
 
 
 def _time(analysis: Analysis, sequence: NDArray[np.int64]) -> FloatArray:
-    start = analysis.series.run.sequence[0]
+    start = analysis.curves.whole_run.sequence[0]
     time: FloatArray = (sequence - start) * analysis.run.metrics.sample_time
     return time
 
 
 def _shade(panel: Axes, analysis: Analysis, time: FloatArray) -> None:
     """Shade the tracking window."""
-    phases = analysis.series.run.first[:, COLUMNS['phase']][:, 0]
+    phases = analysis.curves.whole_run.first[:, COLUMNS['phase']][:, 0]
     tracked = np.flatnonzero(phases == Phase.TRACK)
     if len(tracked):
         panel.axvspan(time[tracked[0]], time[tracked[-1]], color='#f2f5fa', zorder=0)

@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from maglev_model.phases import Phase
+from maglev_monitor.metrics.curves import COLUMNS, RunCurves
+from maglev_monitor.metrics.decoding import decode
+from maglev_monitor.metrics.envelope import Envelope
 from maglev_monitor.metrics.joiner import Joiner
 from maglev_monitor.metrics.run_metrics import RunMetrics
-from maglev_monitor.metrics.samples import decode
-from maglev_monitor.metrics.settings import MetricsParameters
-from maglev_monitor.report.curves import COLUMNS, RunSeries
-from maglev_monitor.report.envelope import Series
+from maglev_monitor.metrics.run_parameters import RunParameters
 
 
 @settings(max_examples=60, deadline=None)
@@ -30,7 +30,7 @@ def test_bins_hold_least_greatest_and_first(data: st.DataObject) -> None:
     values[random.random((total, 2)) < 0.1] = np.nan
     kept = np.flatnonzero(random.random(total) < 0.9)
     kept = np.union1d(kept, [0])
-    series = Series(2, bins)
+    series = Envelope(2, bins)
     edges = sorted(data.draw(st.lists(st.integers(0, len(kept)), max_size=6)))
     for part in np.split(kept, edges):
         series.add(start + part, values[part])
@@ -48,7 +48,7 @@ def test_bins_hold_least_greatest_and_first(data: st.DataObject) -> None:
 
 
 def test_first_values_are_the_first_ones() -> None:
-    series = Series(1, 4)
+    series = Envelope(1, 4)
     series.add(np.arange(8), np.arange(8.0)[:, None])
     np.testing.assert_array_equal(series.first[:, 0], [0.0, 2.0, 4.0, 6.0])
     np.testing.assert_array_equal(series.sequence, [0, 2, 4, 6])
@@ -57,18 +57,18 @@ def test_first_values_are_the_first_ones() -> None:
 @pytest.mark.parametrize('bins', [0, 3, -2])
 def test_bins_must_be_even(bins: int) -> None:
     with pytest.raises(ValueError, match='even'):
-        Series(1, bins)
+        Envelope(1, bins)
 
 
-def test_run_series(run: Any, messages: dict[str, list[bytes]]) -> None:
-    metrics, series = RunMetrics(MetricsParameters()), RunSeries(MetricsParameters())
+def test_run_curves(run: Any, messages: dict[str, list[bytes]]) -> None:
+    metrics, curves = RunMetrics(RunParameters()), RunCurves(RunParameters())
     joiner = Joiner()
     for key, part in messages.items():
         joiner.add(key, decode(key, part))
     for block in joiner.finish():
-        series.add(metrics.add(block))
+        curves.add(metrics.add(block))
     moving = (run.phase != Phase.REST) & (run.phase != Phase.END)
-    whole = series.run
+    whole = curves.whole_run
     assert whole.width == 1
     np.testing.assert_array_equal(whole.sequence, np.flatnonzero(moving))
     np.testing.assert_array_equal(whole.first[:, COLUMNS['true']], run.position[moving])
@@ -79,9 +79,9 @@ def test_run_series(run: Any, messages: dict[str, list[bytes]]) -> None:
     )
     ticks = np.diff(run.stamp)[moving[1:]] * 1e-9
     np.testing.assert_allclose(whole.first[1:, COLUMNS['tick']][:, 0], ticks[1:])
-    assert [step.target[0] for step in series.steps] == [0.027, 0.027]
-    assert [step.target[4] for step in series.steps] == [0.0, 0.01]
-    assert [len(step.sequence) for step in series.steps] == [300, 240]
-    sequence, values = series.tail
+    assert [step.target[0] for step in curves.steps] == [0.027, 0.027]
+    assert [step.target[4] for step in curves.steps] == [0.0, 0.01]
+    assert [len(step.sequence) for step in curves.steps] == [300, 240]
+    sequence, values = curves.tail
     np.testing.assert_array_equal(sequence, np.flatnonzero(run.phase == Phase.TRACK))
     np.testing.assert_array_equal(values[:, COLUMNS['reference']], run.reference[sequence])
