@@ -19,7 +19,7 @@ from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
 from maglev_study.closed_loop import References, Run, run
 
-PARAMS = Path(__file__).parents[2] / 'params'
+PARAMS = Path(__file__).resolve().parents[2] / 'params'
 PERIOD = 1e-3
 OMEGA = 1.5 * math.pi
 Y, X, Z, PHI, THETA = range(5)

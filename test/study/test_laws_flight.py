@@ -22,7 +22,7 @@ from maglev_study.comparison.flight import (
     shaped,
 )
 
-PARAMS = Path(__file__).parents[2] / 'params'
+PARAMS = Path(__file__).resolve().parents[2] / 'params'
 LAWS = ('jacobian_lead_lag', 'feedback_lead_lag', 'feedback_soi', 'regulator_3dof')
 FLOOR = np.array([0.031, 0.0, 0.0, 0.0, 0.0])
 
