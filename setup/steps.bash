@@ -87,6 +87,11 @@ pip_install() {
     --retries 2 "$@"
 }
 
+install_test_tools() { # FOLDER
+  pip_install -r "$root/setup/requirements-test.txt" --target "$1"
+  pip_install -r "$root/setup/requirements-test-nodeps.txt" --no-deps --target "$1"
+}
+
 # The message modules of an installed ROS are compiled against the NumPy it came with: pin that one.
 keep_numpy() {
   PYTHONNOUSERSITE=1 bash -c "${ros_setup:+. $ros_setup >/dev/null; } exec \"\$@\"" - \
@@ -114,7 +119,7 @@ underlay() {
   libraries=$(printf ':%s' "$venv/lib" "$venv"/lib/python3*/site-packages/ros_*.libs)
   printf 'export %s=%q\n' AMENT_PREFIX_PATH "$venv" CMAKE_PREFIX_PATH "$venv" \
     LD_LIBRARY_PATH "${libraries#:}" _ROS_WHEELS_BOOTSTRAP_COMPLETE 1 \
-    RMW_IMPLEMENTATION rmw_fastrtps_cpp
+    RMW_IMPLEMENTATION rmw_fastrtps_cpp ROS_DISTRO jazzy ROS_VERSION 2 ROS_PYTHON_VERSION 3
 }
 
 # Run COMMAND in the underlay and nothing else of the caller's environment but what a build may
@@ -174,6 +179,10 @@ END
       done
     setting PYTHONNOUSERSITE 1
     printf 'export NUMBA_CACHE_DIR=%q"/$(<%q)"\n' "$cache/numba" "$cache/numba/current"
+    echo 'if [ "${MAGLEV_SETUP:-}" = test ]; then'
+    first PATH "$cache/test-tools/bin"
+    first PYTHONPATH "$cache/test-tools"
+    echo 'fi'
     default ROS_AUTOMATIC_DISCOVERY_RANGE LOCALHOST
     default OPENBLAS_NUM_THREADS 1
     default OMP_NUM_THREADS 1

@@ -25,7 +25,7 @@ from maglev_reference.timeline import Timeline
 from maglev_study.closed_loop import run
 from maglev_study.references import References
 
-PARAMS = Path(__file__).parents[2] / 'params'
+PARAMS = Path(__file__).resolve().parents[2] / 'params'
 SINGLE = MachineParameters(motors=1, mass_y=1.725, mass_x=5.3)
 MACHINE = machine_constants(SINGLE)
 BOTH = np.array([1.0, 1.0, 0.0, 0.0, 0.0])

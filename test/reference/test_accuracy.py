@@ -23,7 +23,7 @@ from maglev_reference.trajectories import course
 from maglev_study.closed_loop import run
 from maglev_study.references import References
 
-PARAMS = Path(__file__).parents[2] / 'params'
+PARAMS = Path(__file__).resolve().parents[2] / 'params'
 OMEGA_0 = 1.5 * math.pi
 HOVER = np.array([0.025, 0.0, 0.0, 0.0, 0.0])
 SCENARIOS = (

@@ -18,7 +18,7 @@ from maglev_reference.node import ReferenceNodeParameters
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.timeline import Timeline
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).resolve().parents[2]
 DT = 1e-3
 OMEGA_0 = 1.5 * np.pi
 SHORT = {

@@ -20,7 +20,7 @@ from maglev_plant.simulation import SimulatedStage
 from maglev_study.closed_loop import Run, run
 from maglev_study.references import HOVER, References, ellipse, held, joined, shaped
 
-PARAMS = Path(__file__).parents[2] / 'params'
+PARAMS = Path(__file__).resolve().parents[2] / 'params'
 PERIOD = 1e-3
 
 

@@ -18,7 +18,7 @@ from maglev_study.references import HOVER, ellipse, held
 
 
 def _load() -> ModuleType:
-    path = Path(__file__).parents[2] / 'benchmarks' / 'performance.py'
+    path = Path(__file__).resolve().parents[2] / 'benchmarks' / 'performance.py'
     spec = importlib.util.spec_from_file_location('performance', path)
     assert spec is not None
     assert spec.loader is not None

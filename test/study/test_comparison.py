@@ -20,7 +20,7 @@ from maglev_study.comparison.region import LOST, NOT_SETTLED, Region
 from maglev_study.comparison.table import share, table, to_json
 from maglev_study.references import HOVER
 
-PARAMS = Path(__file__).parents[2] / 'params'
+PARAMS = Path(__file__).resolve().parents[2] / 'params'
 
 
 def test_the_approaches_come_in_the_papers_order() -> None:

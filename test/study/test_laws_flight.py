@@ -14,7 +14,7 @@ from maglev_study.comparison.contestants import Contestant, find_contestants
 from maglev_study.comparison.flight import Flight, judge
 from maglev_study.references import HOVER, ellipse, held, shaped
 
-PARAMS = Path(__file__).parents[2] / 'params'
+PARAMS = Path(__file__).resolve().parents[2] / 'params'
 LAWS = ('jacobian_lead_lag', 'feedback_lead_lag', 'feedback_soi', 'regulator_3dof')
 FLOOR = np.array([0.031, 0.0, 0.0, 0.0, 0.0])
 

@@ -14,7 +14,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from maglev_model.phases import Phase
 from maglev_monitor.bag.writer import BagWriter
 
-MESSAGES = Path(__file__).parents[2] / 'src' / 'maglev_msgs' / 'msg'
+MESSAGES = Path(__file__).resolve().parents[2] / 'src' / 'maglev_msgs' / 'msg'
 RADIUS = 0.397
 TOPICS = {
     'reference': ('/reference', 'maglev_msgs/msg/Reference'),

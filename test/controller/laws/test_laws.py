@@ -24,7 +24,7 @@ from maglev_model.parameters import ParameterError, build, from_yaml, read_yaml,
 from maglev_model.platen import accelerations
 from maglev_plant.parameters import PlantParameters
 
-PARAMS = Path(__file__).parents[3] / 'params'
+PARAMS = Path(__file__).resolve().parents[3] / 'params'
 PERIOD = 1e-3
 MACHINE = machine_constants(MachineParameters())
 SHAPED = {

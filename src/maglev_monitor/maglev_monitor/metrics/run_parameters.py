@@ -128,5 +128,5 @@ def run_from_json(text: str) -> RunParameters:
         raise ParameterError(f'the parameters of the run are no JSON: {error}') from error
     if not isinstance(found, Mapping):
         raise ParameterError('the parameters of the run are no JSON object')
-    named = {_FORMER_NAMES.get(str(name), name): value for name, value in found.items()}
+    named = {str(_FORMER_NAMES.get(str(name), name)): value for name, value in found.items()}
     return build(RunParameters, named)
