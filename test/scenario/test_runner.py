@@ -1,42 +1,18 @@
-"""The scenarios' own shell: options, the nodes' lives and ends. The nodes here are stand-ins."""
+"""One run: options, the nodes' lives and ends. The nodes here are stand-ins."""
 
 from __future__ import annotations
 
 import os
-import shutil
+import resource
 import signal
 import subprocess
-import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from stand_ins import NODES, ROOT, Tree
 
-ROOT = Path(__file__).resolve().parents[2]
-NODES = ('recorder', 'monitor', 'plant', 'controller', 'reference')
-
-# A node that runs until it is told to end and writes down when it does. What it does instead is in
-# a file named after it: `die`, `stubborn`, or, for the monitor, the exit code it ends with.
-STAND_IN = r"""#!/usr/bin/env bash
-name=${0##*/} tree=@TREE@
-echo $$ >"$tree/pids/$name"
-printf '%s\n' "$@" >"$tree/arguments/$name"
-ended() { echo "$name" >>"$tree/ended"; exit "$1"; }
-trap 'ended 130' INT
-trap 'ended 143' TERM
-what=$(cat "$tree/behaviour/$name" 2>/dev/null)
-case $what in
-  die) sleep 0.3; echo '[INFO] all well' >&2; echo 'error: the belt broke' >&2; exit 3 ;;
-  stubborn) trap '' INT TERM ;;
-  [0-9]) sleep 0.5; echo 'y 3.0 um'; echo '{}' >@OUT@/metrics.json; exit "$what" ;;
-esac
-while :; do sleep 0.02; done
-"""
-
-ANALYZE = r"""#!/usr/bin/env bash
-[[ $2 == --out && $1 == "$3/bag" ]] || exit 2
-echo '<html>' >"$3/report.html"
-"""
+from runner import options, overlays, process, run
+from runner.folder import make_folder
 
 # As the real one: waits for its child, also through Ctrl-C, which the child has seen as well.
 ROS2 = r"""#!/usr/bin/env python3
@@ -45,6 +21,7 @@ import sys
 
 assert sys.argv[1:3] == ['run', '--prefix'], sys.argv
 package, executable = sys.argv[4:6]
+print('[ros2run]: this is not the node')
 with open('@TREE@/ros2', 'a') as file:
     print(*sys.argv[4:], file=file)
 path = f'@TREE@/prefix/lib/{package}/{executable}'
@@ -56,93 +33,6 @@ while process.returncode is None:
         pass
 sys.exit(process.returncode)
 """
-
-
-class Tree:
-    """A copy of the scenarios in a workspace of stand-ins."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.out = path / 'run'
-        shutil.copytree(ROOT / 'scenarios', path / 'scenarios')
-        for name in ('pids', 'arguments', 'behaviour', 'params'):
-            (path / name).mkdir()
-        (path / 'setup.sh').write_text(f'export AMENT_PREFIX_PATH=/nowhere:{path}/prefix\n')
-        for name in ('plant', 'scenario_ellipse', 'soft'):
-            (path / 'params' / f'{name}.yaml').write_text('/**:\n  ros__parameters: {}\n')
-        for name in NODES:
-            package = 'maglev_monitor' if name == 'recorder' else f'maglev_{name}'
-            self.executable(package, name, STAND_IN)
-        self.executable('maglev_monitor', 'analyze', ANALYZE)
-        self.behave('monitor', '0')
-
-    def executable(self, package: str, name: str, text: str) -> None:
-        """Write one stand-in as ``prefix/lib/package/name``."""
-        self.script(self.path / 'prefix' / 'lib' / package / name, text)
-
-    def script(self, file: Path, text: str) -> None:
-        """Write an executable file, naming this tree in it."""
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(text.replace('@TREE@', str(self.path)).replace('@OUT@', str(self.out)))
-        file.chmod(0o755)
-
-    def behave(self, node: str, what: str) -> None:
-        """Choose what a stand-in does."""
-        (self.path / 'behaviour' / node).write_text(what)
-
-    def start(self, *options: str, path: str = '') -> subprocess.Popen[str]:
-        """Start the ellipse as a shell would, in a session of its own."""
-        return subprocess.Popen(
-            [self.path / 'scenarios' / 'ellipse.sh', *options],
-            cwd=self.path,
-            env={**os.environ, 'PATH': path + '/usr/bin:/bin'},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            start_new_session=True,
-        )
-
-    def run(self, *options: str, path: str = '') -> tuple[int, str]:
-        """Run the ellipse and return its exit code and output."""
-        process = self.start('--out', str(self.out), *options, path=path)
-        output, _ = process.communicate(timeout=30)
-        return process.returncode, output
-
-    def started(self) -> list[str]:
-        """The stand-ins that have come up."""
-        return [file.name for file in (self.path / 'pids').iterdir() if file.read_text().strip()]
-
-    def wait_started(self) -> None:
-        """Wait until all five are up."""
-        deadline = time.monotonic() + 10.0
-        while len(self.started()) < len(NODES):
-            assert time.monotonic() < deadline, self.started()
-            time.sleep(0.02)
-
-    def alive(self) -> list[str]:
-        """The stand-ins that still run."""
-        found = []
-        for name in self.started():
-            status = Path('/proc', (self.path / 'pids' / name).read_text().strip(), 'status')
-            if status.exists() and 'State:\tZ' not in status.read_text():
-                found.append(name)
-        return found
-
-    def ended(self) -> list[str]:
-        """The stand-ins that were told to end, in that order."""
-        return (self.path / 'ended').read_text().split()
-
-    def arguments(self, node: str) -> list[str]:
-        """The arguments a stand-in was given."""
-        return (self.path / 'arguments' / node).read_text().splitlines()
-
-
-@pytest.fixture
-def tree(tmp_path: Path) -> Iterator[Tree]:
-    made = Tree(tmp_path)
-    yield made
-    for name in made.alive():
-        os.kill(int((tmp_path / 'pids' / name).read_text()), signal.SIGKILL)
 
 
 def test_a_run_that_passes(tree: Tree) -> None:
@@ -157,30 +47,30 @@ def test_a_run_that_passes(tree: Tree) -> None:
 
 
 def test_the_nodes_get_their_parameters(tree: Tree) -> None:
-    soft = tree.path / 'mine.yaml'
-    soft.write_text('controller:\n  ros__parameters: {}\n')
+    tree.parameters('mine.yaml', 'controller')
+    tree.parameters('params/machine.yaml')
     options = ('--mode', 'realtime', '--duration=3', '--params', 'soft', '--params', 'mine.yaml')
     code, output = tree.run(*options)
     assert code == 0, output
-    params = tree.path / 'params'
-    plant = tree.arguments('plant')
-    files = [plant[i + 1] for i, word in enumerate(plant) if word == '--params-file']
-    assert files == [
-        str(file)
-        for file in (
-            params / 'plant.yaml',
-            params / 'scenario_ellipse.yaml',
-            params / 'soft.yaml',
-            soft,
-        )
-    ]
-    assert {'mode:=realtime', 'watchers:=2'} <= set(plant)
-    assert f'effective_parameters:={tree.out}/params/plant.yaml' in plant
+    over = ['params/scenario_ellipse.yaml', 'params/soft.yaml', 'mine.yaml']
+    assert tree.files('plant') == ['params/machine.yaml', 'params/plant.yaml', *over]
+    for node in NODES:
+        assert tree.files(node)[0] == 'params/machine.yaml'
+        assert tree.files(node)[-3:] == over
+        assert f'effective_parameters:={tree.out}/params/{node}.yaml' in tree.arguments(node)
+    assert {'mode:=realtime', 'watchers:=2'} <= set(tree.arguments('plant'))
     reference = tree.arguments('reference')
-    assert {'duration:=3.0', 'autostart:=true', 'watchers:=2'} <= set(reference)
+    assert {'duration:=3.0', 'autostart:=true', 'watchers:=2', 'lead:=128'} <= set(reference)
     monitor = tree.arguments('monitor')
     assert {f'output:={tree.out}/metrics.json', 'scenario:=ellipse', 'stage:=plant'} <= set(monitor)
     assert f'output:={tree.out}/bag' in tree.arguments('recorder')
+
+
+def test_without_a_machine_file_each_node_starts_with_its_own(tree: Tree) -> None:
+    assert tree.run()[0] == 0
+    assert tree.files('plant') == ['params/plant.yaml', 'params/scenario_ellipse.yaml']
+    assert tree.files('controller') == ['params/scenario_ellipse.yaml']
+    assert not [word for word in tree.arguments('reference') if 'duration' in word]
 
 
 def test_a_run_outside_its_limits_still_has_its_report(tree: Tree) -> None:
@@ -189,6 +79,14 @@ def test_a_run_outside_its_limits_still_has_its_report(tree: Tree) -> None:
     assert code == 1
     assert 'FAILED' in output
     assert (tree.out / 'report.html').exists()
+
+
+def test_a_run_without_a_report_fails(tree: Tree) -> None:
+    broken = '#!/usr/bin/env bash\necho "error: no bag"\nexit 2\n'
+    tree.executable('maglev_monitor', 'analyze', broken)
+    code, output = tree.run()
+    assert code == 1
+    assert 'ellipse: failed: no report: error: no bag\nellipse: FAILED' in output
 
 
 @pytest.mark.parametrize('node', ['plant', 'controller', 'reference', 'recorder', 'monitor'])
@@ -220,7 +118,7 @@ def test_a_node_that_is_not_there_stops_before_the_start(tree: Tree) -> None:
     assert not tree.out.exists()
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_stops_the_nodes_in_order(tree: Tree, number: signal.Signals) -> None:
     tree.behave('monitor', 'run')
     process = tree.start('--out', str(tree.out))
@@ -233,23 +131,41 @@ def test_a_signal_stops_the_nodes_in_order(tree: Tree, number: signal.Signals) -
     assert tree.alive() == []
 
 
+def test_a_signal_ends_the_analysis(tree: Tree) -> None:
+    tree.behave('analyze', 'hang')
+    process = tree.start('--out', str(tree.out))
+    tree.wait_started('analyze')
+    process.send_signal(signal.SIGTERM)
+    output, _ = process.communicate(timeout=20)
+    assert process.returncode == 143, output
+    assert 'passed' not in output
+    assert tree.alive() == []
+
+
 def test_killing_the_scenario_leaves_no_orphan(tree: Tree) -> None:
     tree.behave('monitor', 'run')
     process = tree.start('--out', str(tree.out))
     tree.wait_started()
     process.kill()
     process.communicate(timeout=20)
-    deadline = time.monotonic() + 5.0
-    while tree.alive() and time.monotonic() < deadline:
-        time.sleep(0.02)
-    assert tree.alive() == []
+    tree.wait_gone()
+
+
+def test_a_run_goes_on_when_nobody_reads_it_any_more(tree: Tree) -> None:
+    process = tree.start('--out', str(tree.out))
+    assert process.stdout is not None
+    process.stdout.close()
+    assert process.wait(timeout=20) == 0
+    assert (tree.out / 'report.html').exists()
 
 
 def test_a_node_that_will_not_stop_is_killed(tree: Tree) -> None:
-    library = tree.path / 'scenarios' / 'lib.sh'
-    text = library.read_text()
-    assert 'patience=8' in text
-    library.write_text(text.replace('patience=8', 'patience=1').replace('patience=3', 'patience=1'))
+    module = tree.path / 'scenarios' / 'runner' / 'process.py'
+    text = module.read_text()
+    assert 'SIGINT: 8.0, signal.SIGTERM: 3.0' in text
+    module.write_text(
+        text.replace('SIGINT: 8.0, signal.SIGTERM: 3.0', 'SIGINT: 1, signal.SIGTERM: 1')
+    )
     tree.behave('plant', 'stubborn')
     code, output = tree.run()
     assert code == 1
@@ -259,9 +175,10 @@ def test_a_node_that_will_not_stop_is_killed(tree: Tree) -> None:
 
 def test_ros2_run_is_used_where_it_is(tree: Tree) -> None:
     tree.script(tree.path / 'bin' / 'ros2', ROS2)
-    code, output = tree.run(path=f'{tree.path}/bin:')
+    code, output = tree.run()
     assert code == 0, output
     assert 'maglev_reference reference --ros-args' in (tree.path / 'ros2').read_text()
+    assert 'this is not the node' not in output
     assert tree.ended() == ['reference', 'controller', 'plant', 'recorder']
     assert tree.alive() == []
 
@@ -272,6 +189,17 @@ def test_a_folder_that_cannot_be_written(tree: Tree) -> None:
     assert code == 2
     assert f"cannot write to '{tree.out}'" in output
     assert tree.started() == []
+
+
+def test_a_full_disk_shows_before_the_start(tmp_path: Path) -> None:
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, limits[1]))
+    try:
+        with pytest.raises(options.WrongUseError, match='check its permissions and the space left'):
+            make_folder(tmp_path / 'run')
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert list((tmp_path / 'run').iterdir()) == []
 
 
 def test_a_folder_that_holds_a_run_is_not_touched(tree: Tree) -> None:
@@ -293,17 +221,24 @@ def test_a_folder_that_holds_a_run_is_not_touched(tree: Tree) -> None:
         (['--duration', '-1'], "--duration is '-1'"),
         (['--duration', '0'], "--duration is '0'"),
         (['--duration'], '--duration needs a value'),
+        (['--out='], '--out needs a folder'),
         (['--params', 'none.yaml'], "there is no file 'none.yaml'"),
         (['--params', 'typo.yaml'], "parameters for 'contoller', which is no node"),
+        (['--params', 'twice.yaml'], "'speed' is given twice"),
+        (['--params', 'flat.yaml'], "section 'controller' must hold 'ros__parameters'"),
     ],
 )
 def test_options_that_make_no_sense(tree: Tree, options: list[str], words: str) -> None:
     (tree.path / 'typo.yaml').write_text('# why\n\ncontoller:\n  ros__parameters:\n    a: 1\n')
+    (tree.path / 'twice.yaml').write_text('plant:\n  ros__parameters: {speed: 1, speed: 2}\n')
+    (tree.path / 'flat.yaml').write_text('controller:\n  speed: 1\n')
     code, output = tree.run(*options)
     assert code == 2
     assert words in output
+    assert output.startswith('ellipse: error: ')
     assert len(output.splitlines()) == 1
     assert tree.started() == []
+    assert not tree.out.exists()
 
 
 def test_help_starts_nothing(tree: Tree) -> None:
@@ -312,6 +247,16 @@ def test_help_starts_nothing(tree: Tree) -> None:
     assert code == 0
     for option in ('--stage', '--mode', '--duration', '--params', '--out'):
         assert option in output
+
+
+def test_what_is_wrong_is_said_before_the_set_up_where_there_is_a_python(tree: Tree) -> None:
+    (tree.path / 'setup.sh').write_text('echo set-up\nexit 70\n')
+    code, output = tree.run('--mode', 'fast')
+    assert code == 2
+    assert "--mode is 'fast'" in output
+    assert tree.run() == (70, 'set-up\n')
+    tree.script(tree.path / 'bin' / 'python3', '#!/usr/bin/env bash\nexit 1\n')
+    assert tree.run('--mode', 'fast') == (70, 'set-up\n')
 
 
 def test_an_interrupt_is_heeded_where_it_was_ignored(tree: Tree) -> None:
@@ -328,35 +273,20 @@ def test_an_interrupt_is_heeded_where_it_was_ignored(tree: Tree) -> None:
     assert tree.alive() == []
 
 
-def trajectory(tree: Tree, *options: str) -> tuple[int, str]:
-    """Run the scenario of any trajectory."""
-    process = subprocess.run(
-        [tree.path / 'scenarios' / 'trajectory.sh', *options],
-        cwd=tree.path,
-        env={**os.environ, 'PATH': '/usr/bin:/bin'},
-        capture_output=True,
-        text=True,
-        timeout=30,
-        check=False,
-    )
-    return process.returncode, process.stdout + process.stderr
-
-
 def test_a_trajectory_is_chosen_by_name_or_file(tree: Tree) -> None:
-    (tree.path / 'params' / 'scenario_file.yaml').write_text('/**:\n  ros__parameters: {}\n')
-    code, output = trajectory(tree, 'ellipse', '--out', str(tree.out))
+    tree.parameters('params/scenario_file.yaml')
+    code, output = tree.finish('ellipse', '--out', str(tree.out), script='trajectory')
     assert code == 0, output
     assert 'file.path' not in ' '.join(tree.arguments('reference'))
-    path = tree.path / 'a path.csv'
+    path = tree.path / "a path's.csv"
     path.write_text('t,y,x,z,phi,theta\n')
-    code, output = trajectory(
-        tree, path.name, '--out', str(tree.path / 'second'), '--duration', '3'
-    )
-    assert code in (0, 1), output  # the stand-in of the monitor writes to the first folder
+    second = str(tree.path / 'second')
+    code, output = tree.finish(path.name, '--out', second, '--duration', '3', script='trajectory')
+    assert code == 0, output
     arguments = tree.arguments('reference')
-    assert f"file.path:='{path}'" in arguments
+    assert f"file.path:='{tree.path}/a path''s.csv'" in arguments
     assert 'duration:=3.0' in arguments
-    assert str(tree.path / 'params' / 'scenario_file.yaml') in arguments
+    assert 'params/scenario_file.yaml' in tree.files('reference')
 
 
 @pytest.mark.parametrize(
@@ -373,7 +303,77 @@ def test_a_trajectory_is_chosen_by_name_or_file(tree: Tree) -> None:
 def test_a_trajectory_that_makes_no_sense(
     tree: Tree, options: list[str], code: int, words: str
 ) -> None:
-    found, output = trajectory(tree, *options)
+    found, output = tree.finish(*options, script='trajectory')
     assert found == code, output
     assert words in output
     assert not tree.started()
+
+
+def test_the_shipped_overlays_are_taken() -> None:
+    for path in sorted((ROOT / 'params').rglob('*.yaml')):
+        name = str(path.relative_to(ROOT / 'params').with_suffix(''))
+        assert overlays.overlay('--params', name) == str(path)
+        overlays.check_overlay(str(path))
+
+
+@pytest.mark.parametrize(
+    ('log', 'words'),
+    [
+        ('[INFO] up\nFATAL: no encoder\nit ends\n\n', 'FATAL: no encoder'),
+        ('[INFO] up\nlast\n[ros2run]: error: process exited\n', 'last'),
+        ('\n', ''),
+    ],
+)
+def test_last_words(tmp_path: Path, log: str, words: str) -> None:
+    (tmp_path / 'log').write_text(log)
+    assert process.last_words(tmp_path / 'log') == words
+    assert process.last_words(tmp_path / 'none') == ''
+
+
+def test_progress_is_shown_in_whole_lines(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = tmp_path / 'log'
+    progress = run.Progress(log)
+    progress.show()
+    shown = []
+    for text in ('y 3.0', ' um\nx', ' 4\n[ros2run]: hm\n', 'last'):
+        with log.open('a') as file:
+            file.write(text)
+        progress.show()
+        shown.append(capsys.readouterr().out)
+    progress.show(rest=True)
+    assert [*shown, capsys.readouterr().out] == ['', 'y 3.0 um\n', 'x 4\n', '', 'last\n']
+
+
+def test_without_setpriv_the_nodes_run_all_the_same(tree: Tree) -> None:
+    for name in ('bash', 'cat', 'dirname', 'sleep'):
+        (tree.path / 'bin' / name).symlink_to(f'/usr/bin/{name}')
+    out = ('--out', str(tree.out))
+    code, output = tree.finish(*out, script='ellipse', path='/nowhere')
+    assert code == 0, output
+    tree.executable('maglev_controller', 'controller', '#!/no/such/interpreter\n')
+    tree.behave('monitor', 'run')
+    second = ('--out', str(tree.path / 'second'))
+    code, output = tree.finish(*second, script='ellipse', path='/nowhere')
+    assert code == 1
+    assert 'ellipse: failed: [Errno 2] No such file' in output
+    assert f'{tree.path}/prefix/lib/maglev_controller/controller' in output
+    assert tree.alive() == []
+
+
+def test_a_program_that_leaves_a_child_is_ended_with_it(tmp_path: Path) -> None:
+    command = ['bash', '-c', f'sleep 60 & echo $! >{tmp_path}/pid; exit 4']
+    program = process.Process(command, tmp_path / 'log')
+    assert program._process.wait(10) == 4
+    child = int((tmp_path / 'pid').read_text())
+    os.kill(child, 0)
+    program.stop(lambda duration: None)
+    assert program.code == 4
+    ended = subprocess.run(
+        ['bash', '-c', f'sleep 0.2; grep State /proc/{child}/status'],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert 'Z' in ended.stdout or not ended.stdout
