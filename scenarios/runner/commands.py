@@ -3,24 +3,15 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from typing import NoReturn
 
-from runner import usage
 from runner.console import complain, say
 from runner.folder import default_folder
 from runner.graph import Flight, Scenario
-from runner.options import (
-    HelpAskedError,
-    Option,
-    WrongUseError,
-    folder,
-    one_of,
-    parse,
-    seconds,
-    word,
-)
+from runner.options import Command, HelpAskedError, Option, WrongUseError, folder, one_of, seconds
 from runner.overlays import PARAMS, check_overlay, overlay
 from runner.paper_tables import fly_all
 from runner.process import installed
@@ -33,16 +24,37 @@ Job = Callable[[], int]
 LATER = 75
 """Exit code of ``--check`` when there is more to do than to answer."""
 
-MODE = Option(one_of('lockstep', 'realtime'))
-OUT = Option(folder)
-PARAMETERS = Option(overlay)
-FLIGHT = {
-    '--stage': Option(one_of('plant', 'hw_bridge')),
-    '--mode': MODE,
-    '--duration': Option(seconds),
-    '--params': PARAMETERS,
-    '--out': OUT,
+MODE = Option(
+    'as fast as it computes and repeatable, or 1 kHz by the clock\n(default lockstep)',
+    'lockstep|realtime',
+    one_of('lockstep', 'realtime'),
+)
+PAPER = {
+    'ellipse': "The paper's ellipse in y, x and z: lifts off, follows it for 60 s measured, lands.",
+    'ellipse_4dof': "The paper's ellipse with theta turning along: lifts off, follows it for 60 s"
+    ' measured, lands.',
+    'steps': "The steps of the paper's Table III in y, x, z and theta, each from rest, other axes"
+    ' held.',
 }
+SINGLE_MOTOR = """\
+The single-motor machine of refs. [10], [11]: steps, then sinusoids, in air gap and displacement."""
+TRAJECTORY = """\
+A trajectory: lifts off, follows it measured, lands.
+
+  NAME      {names}
+  FILE.csv  header t,y,x,z,phi,theta in s, m, rad; equally spaced rows; followed over and over, so
+            that its last row is its first again
+params/matched_NAME.yaml, where there is one, is an overlay with internal models to match."""
+PAPER_TABLES = """\
+All experiments of the paper, Table III and Figs. 4 to 8, through the nodes on the benchmark plant,
+with the paper's controller and with ours; then one page with the paper's own figures beside both.
+Some minutes in lockstep, a quarter of an hour in real time."""
+COMPARE = """\
+Flies all control laws over the same steps, ellipses, disturbances and mismatches on the benchmark
+plant, prints one table and draws their regions of operation. A few minutes on two cores."""
+COMMISSION = """\
+Brings a machine up step by step at low current and says what is wired or set wrongly. Without an
+overlay it runs on the emulated boards."""
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -63,8 +75,38 @@ def main(arguments: Sequence[str]) -> int:
         return 2
 
 
-def _flight(scenario: Scenario, text: str, options: Sequence[str]) -> Flight:
-    given = parse(options, FLIGHT, text.format(name=scenario.name))
+def _out_option(what: str, name: str) -> Option:
+    return Option(f'where {what} left (default runs/{name}-<time>)', 'DIR', folder)
+
+
+def _out(name: str, given: Mapping[str, list[str]]) -> Path:
+    return Path(given['--out'][-1]) if '--out' in given else default_folder(name)
+
+
+def _flight_command(name: str, description: str, call: str = '') -> Command:
+    options = {
+        '--stage': Option(
+            'what is levitated: the simulated plant, or the hardware (default plant)',
+            'plant|hw_bridge',
+            one_of('plant', 'hw_bridge'),
+        ),
+        '--mode': MODE,
+        '--duration': Option(
+            'measured time: of the tracking window, or of each step [s]', 'S', seconds
+        ),
+        '--params': Option(
+            "parameters on top of the scenario's, from the current folder or from\n"
+            'params/; repeatable, the last one wins',
+            'OVERLAY.yaml',
+            overlay,
+        ),
+        '--out': _out_option('the run is', name),
+    }
+    return Command(call or f'{name}.sh', description, options)
+
+
+def _flight(scenario: Scenario, command: Command, options: Sequence[str]) -> Flight:
+    given = command.parse(options)
     return Flight(
         scenario,
         out=_out(scenario.name, given),
@@ -75,106 +117,111 @@ def _flight(scenario: Scenario, text: str, options: Sequence[str]) -> Flight:
     )
 
 
-def _out(name: str, given: dict[str, list[str]]) -> Path:
-    return Path(given['--out'][-1]) if '--out' in given else default_folder(name)
-
-
-def _fly_in_turn(flights: Sequence[Flight]) -> int:
+def _fly_in_turn(*flights: Flight) -> int:
     """Fly one after another, until one does not pass."""
     signals = Signals()
     return next((code for flight in flights if (code := fly(flight, signals))), 0)
 
 
-def _one_flight(name: str, text: str, options: Sequence[str]) -> Job:
+def _one_flight(name: str, description: str, options: Sequence[str]) -> Job:
     scenario = Scenario(name, (f'scenario_{name}.yaml',))
-    return partial(_fly_in_turn, [_flight(scenario, text, options)])
+    return partial(_fly_in_turn, _flight(scenario, _flight_command(name, description), options))
 
 
 def _single_motor(options: Sequence[str]) -> Job:
-    scenario = Scenario('single_motor', ('single_motor.yaml',))
-    flight = _flight(scenario, usage.SINGLE_MOTOR, options)
-    parts = []
-    for part in ('steps', 'sinusoids'):
-        files = (*scenario.files, f'scenario_single_motor_{part}.yaml')
-        parts.append(
-            flight._replace(scenario=scenario._replace(files=files), out=flight.out / part)
+    name = 'single_motor'
+    flight = _flight(Scenario(name, ()), _flight_command(name, SINGLE_MOTOR), options)
+    parts = [
+        flight._replace(
+            scenario=Scenario(name, (f'{name}.yaml', f'scenario_{name}_{part}.yaml')),
+            out=flight.out / part,
         )
-    return partial(_fly_in_turn, parts)
+        for part in ('steps', 'sinusoids')
+    ]
+    return partial(_fly_in_turn, *parts)
 
 
 def _trajectory(options: Sequence[str]) -> Job:
-    names = [
-        name
-        for path in sorted(PARAMS.glob('scenario_*.yaml'))
-        if (name := path.stem.removeprefix('scenario_')) != 'file'
-        and not name.startswith('single_motor_')
-    ]
-    text = usage.TRAJECTORY.replace('NAMES', ' '.join(names))
+    found = sorted(path.stem.removeprefix('scenario_') for path in PARAMS.glob('scenario_*.yaml'))
+    names = [name for name in found if name != 'file' and not name.startswith('single_motor_')]
+    description = TRAJECTORY.format(names=' '.join(names))
+    call = 'trajectory.sh NAME|FILE.csv'
     chosen, *rest = options or ['--help']
     if chosen in ('--help', '-h'):
-        raise HelpAskedError(text.format(name='trajectory'))
-    if not chosen.endswith('.csv'):
-        return _one_flight(one_of(*names)('the trajectory', chosen), text, rest)
-    if not Path(chosen).is_file() or not os.access(chosen, os.R_OK):
-        raise WrongUseError(f"cannot read '{chosen}'")
-    path = str(Path(chosen).resolve()).replace("'", "''")
-    scenario = Scenario('file', ('scenario_file.yaml',), (f"file.path:='{path}'",))
-    return partial(_fly_in_turn, [_flight(scenario, text, rest)])
+        raise HelpAskedError(_flight_command('trajectory', description, call).usage())
+    if chosen.endswith('.csv'):
+        if not Path(chosen).is_file() or not os.access(chosen, os.R_OK):
+            raise WrongUseError(f"cannot read '{chosen}'")
+        quoted = str(Path(chosen).resolve()).replace("'", "''")
+        scenario = Scenario('file', ('scenario_file.yaml',), (f"file.path:='{quoted}'",))
+    else:
+        name = one_of(*names)('the trajectory', chosen)
+        scenario = Scenario(name, (f'scenario_{name}.yaml',))
+    command = _flight_command(scenario.name, description, call)
+    return partial(_fly_in_turn, _flight(scenario, command, rest))
 
 
 def _paper_tables(options: Sequence[str]) -> Job:
-    table = {'--mode': MODE, '--out': OUT, '--quick': Option()}
-    given = parse(options, table, usage.PAPER_TABLES)
+    name = 'paper_tables'
+    table = {
+        '--mode': MODE,
+        '--out': _out_option('runs and page are', name),
+        '--quick': Option('short windows: 6 s for each step, 4 s of each ellipse'),
+    }
+    given = Command(f'{name}.sh', PAPER_TABLES, table).parse(options)
     mode = given.get('--mode', ['lockstep'])[-1]
-    return partial(fly_all, _out('paper_tables', given), mode, quick='--quick' in given)
+    return partial(fly_all, _out(name, given), mode, quick='--quick' in given)
 
 
 def _compare(options: Sequence[str]) -> Job:
+    laws = 'only these: files of params/laws, paper, default'
+    bandwidth = 'crossover of the laws with compensators, on all axes (default: as in their files)'
     table = {
-        '--out': OUT,
-        '--quick': Option(),
-        '--laws': Option(word, several=True),
-        '--bandwidth': Option(word),
+        '--out': _out_option('the results are', 'compare'),
+        '--quick': Option('coarse regions and short windows'),
+        '--laws': Option(laws, 'NAME...', several=True),
+        '--bandwidth': Option(bandwidth, 'RAD_S'),
     }
-    given = parse(options, table, usage.COMPARE)
+    given = Command('compare.sh', COMPARE, table).parse(options)
     arguments = ['--params', str(PARAMS), '--out', str(_out('compare', given))]
-    for name in ('--quick', '--laws', '--bandwidth'):
-        if name in given:
-            arguments += [name, *given[name]]
+    arguments += _as_given(given, '--quick', '--laws', '--bandwidth')
     return partial(_become, 'maglev_study', 'compare', arguments)
 
 
 def _commission(options: Sequence[str]) -> Job:
-    table = {'--params': PARAMETERS, '--current': Option(word), '--yes': Option()}
-    given = parse(options, table, usage.COMMISSION)
+    where = 'parameters of hw_bridge, from the current folder or from params/;'
+    current = 'largest current of a phase alone, 0.2 to 3 A (default 1.5)'
+    table = {
+        '--params': Option(f'{where}\nrepeatable, the last one wins', 'OVERLAY.yaml', overlay),
+        '--current': Option(current, 'A'),
+        '--yes': Option('do not ask before each step'),
+    }
+    given = Command('commission.sh', COMMISSION, table).parse(options)
     overlays = given.get('--params', [])
-    files = [str(PARAMS / name) for name in ('machine.yaml', 'hw_bridge.yaml')]
+    files = [PARAMS / name for name in ('machine.yaml', 'hw_bridge.yaml')]
     arguments = []
-    for file in [*filter(os.path.isfile, files), *overlays]:
+    for file in [*(str(file) for file in files if file.is_file()), *overlays]:
         arguments += ['--params', file]
-    for name in ('--current', '--yes'):
-        if name in given:
-            arguments += [name, *given[name]]
-
-    def job() -> int:
-        for path in overlays:
-            check_overlay(path)
-        return _become('maglev_hw_bridge', 'commission', arguments)
-
-    return job
+    arguments += _as_given(given, '--current', '--yes')
+    return partial(_become, 'maglev_hw_bridge', 'commission', arguments, overlays)
 
 
-def _become(package: str, executable: str, arguments: Sequence[str]) -> int:
+def _as_given(given: Mapping[str, list[str]], *names: str) -> list[str]:
+    return [part for name in names if name in given for part in (name, *given[name])]
+
+
+def _become(
+    package: str, executable: str, arguments: Sequence[str], overlays: Sequence[str] = ()
+) -> NoReturn:
     """Go on as another program, which has the terminal and its signals to itself."""
+    for path in overlays:
+        check_overlay(path)
     path = installed(package, executable)
     os.execv(path, [path, *arguments])
-    return 1  # not reached
 
 
 COMMANDS: dict[str, Callable[[Sequence[str]], Job]] = {
-    'ellipse': partial(_one_flight, 'ellipse', usage.ELLIPSE),
-    'ellipse_4dof': partial(_one_flight, 'ellipse_4dof', usage.ELLIPSE_4DOF),
-    'steps': partial(_one_flight, 'steps', usage.STEPS),
+    **{name: partial(_one_flight, name, text) for name, text in PAPER.items()},
     'single_motor': _single_motor,
     'trajectory': _trajectory,
     'paper_tables': _paper_tables,

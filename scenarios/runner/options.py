@@ -19,42 +19,60 @@ class HelpAskedError(Exception):
 
 
 class Option(NamedTuple):
-    """What an option takes: a value that passes ``check``, several such words, or nothing."""
+    """What --help says of an option, its argument, empty for a flag, and how that is checked."""
 
-    check: Check | None = None
+    help: str
+    argument: str = ''
+    check: Check = lambda _, value: value
     several: bool = False
 
 
-def parse(
-    arguments: Sequence[str], options: Mapping[str, Option], usage: str
-) -> dict[str, list[str]]:
-    """The checked values of each option that is given, in their order.
+class Command(NamedTuple):
+    """What a script is called with."""
 
-    Raises :class:`WrongUseError`, and :class:`HelpAskedError` for ``--help``.
-    """
-    found: dict[str, list[str]] = {}
-    rest = list(arguments)
-    while rest:
-        word = rest.pop(0)
-        if word in ('--help', '-h'):
-            raise HelpAskedError(usage)
-        name, attached, value = word.partition('=') if word.startswith('--') else (word, '', '')
-        if name not in options:
-            raise WrongUseError(f"unknown option '{name}'; see --help")
-        check, several = options[name]
-        values = found.setdefault(name, [])
-        if check is None:
-            if attached:
-                raise WrongUseError(f'{name} takes no value; see --help')
-            continue
-        if not attached:
-            if not rest:
-                raise WrongUseError(f'{name} needs a value; see --help')
-            value = rest.pop(0)
-        values.append(check(name, value))
-        while several and rest and not rest[0].startswith('-'):
-            values.append(check(name, rest.pop(0)))
-    return found
+    call: str
+    description: str
+    options: Mapping[str, Option]
+
+    def usage(self) -> str:
+        """What --help says."""
+        rows = [(f'{name} {one.argument}'.rstrip(), one.help) for name, one in self.options.items()]
+        rows.append(('--help', 'this text'))
+        width = 4 + max(len(left) for left, _ in rows)
+        lines = [
+            f'  {left}'.ljust(width) + text.replace('\n', '\n' + ' ' * width) for left, text in rows
+        ]
+        call = f'usage: scenarios/{self.call} [options]'
+        return '\n'.join([self.description, '', call, *lines])
+
+    def parse(self, arguments: Sequence[str]) -> dict[str, list[str]]:
+        """The checked values of each option that is given, in their order.
+
+        Raises :class:`WrongUseError`, and :class:`HelpAskedError` for ``--help``.
+        """
+        found: dict[str, list[str]] = {}
+        rest = list(arguments)
+        while rest:
+            first = rest.pop(0)
+            if first in ('--help', '-h'):
+                raise HelpAskedError(self.usage())
+            name, attached, value = first.partition('=')
+            if name not in self.options:
+                raise WrongUseError(f"unknown option '{name}'; see --help")
+            _, argument, check, several = self.options[name]
+            values = found.setdefault(name, [])
+            if not argument:
+                if attached:
+                    raise WrongUseError(f'{name} takes no value; see --help')
+                continue
+            if not attached:
+                if not rest:
+                    raise WrongUseError(f'{name} needs a value; see --help')
+                value = rest.pop(0)
+            values.append(check(name, value))
+            while several and rest and not rest[0].startswith('-'):
+                values.append(check(name, rest.pop(0)))
+        return found
 
 
 def one_of(*choices: str) -> Check:
@@ -79,9 +97,4 @@ def folder(name: str, value: str) -> str:
     """The name of a folder."""
     if not value:
         raise WrongUseError(f'{name} needs a folder')
-    return value
-
-
-def word(name: str, value: str) -> str:
-    """Anything: the program it goes to looks at it."""
     return value

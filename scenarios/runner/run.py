@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from runner.console import complain, say
@@ -21,19 +22,16 @@ def fly(flight: Flight, signals: Signals) -> int:
     for path in flight.overlays:
         check_overlay(path)
     commands = {node: flight.program(node) for node in START_ORDER}
+    analyze = program('maglev_monitor', 'analyze')
     flight = flight._replace(out=make_folder(flight.out))
     name = flight.scenario.name
     say(f'{name}: {flight.stage}, {flight.mode}, into {flight.out}')
     run = Run(flight, signals)
     try:
-        run.start(commands)
-        whole = run.watch()
+        passed = run.measure(commands) and not signals.code and run.judge(analyze)
     except OSError as error:
         complain(f'{name}: failed: {error}')
-        whole = False
-    finally:
-        run.stop()
-    passed = whole and not signals.code and run.judge()
+        passed = False
     if signals.code:
         complain(f'{name}: interrupted; what was recorded is kept:')
     else:
@@ -52,20 +50,35 @@ class Run:
         self._nodes: dict[str, Process] = {}
         self._progress = Progress(self._log('monitor'))
 
-    def start(self, commands: dict[str, list[str]]) -> None:
-        """Start all nodes, unless a signal comes; raises OSError when one cannot be started."""
-        for node in START_ORDER:
-            if self._signals.code:
-                return
-            command = [*commands[node], *self._flight.arguments(node)]
-            self._nodes[node] = Process(command, self._log(node))
+    def measure(self, commands: Mapping[str, Sequence[str]]) -> bool:
+        """Whether the nodes lived until the monitor came to its end, and no signal came before.
 
-    def watch(self) -> bool:
-        """Whether the monitor came to its end before another node did, and before a signal."""
+        Raises OSError when one cannot be started. However it goes, none lives on.
+        """
+        try:
+            for node in START_ORDER:
+                if self._signals.code:
+                    return False
+                command = [*commands[node], *self._flight.arguments(node)]
+                self._nodes[node] = Process(command, self._log(node))
+            return self._watch()
+        finally:
+            for node in STOP_ORDER:
+                if node in self._nodes:
+                    self._nodes[node].stop(self._pause)
+            self._progress.show(rest=True)
+
+    def judge(self, analyze: Sequence[str]) -> bool:
+        """Whether the nodes ended cleanly, there is a report, and the limits are kept."""
+        clean, reported = self._clean_ends(), self._report(analyze)
+        return clean and reported and self._nodes['monitor'].code == 0
+
+    def _watch(self) -> bool:
         while not self._signals.code:
             self._pause(0.1)
             ended = [node for node, process in self._nodes.items() if process.code is not None]
-            early = [node for node in ended if node != 'monitor' or not self._measured]
+            measured = (self._out / 'metrics.json').is_file()
+            early = [node for node in ended if node != 'monitor' or not measured]
             for node in early:
                 words = last_words(self._log(node)) or 'it said nothing'
                 code = self._nodes[node].code
@@ -74,18 +87,6 @@ class Run:
             if ended:
                 return not early
         return False
-
-    def stop(self) -> None:
-        """End what still runs, in order."""
-        for node in STOP_ORDER:
-            if node in self._nodes:
-                self._nodes[node].stop(self._pause)
-        self._progress.show(rest=True)
-
-    def judge(self) -> bool:
-        """Whether the nodes ended cleanly, there is a report, and the limits are kept."""
-        clean, reported = self._clean_ends(), self._report()
-        return clean and reported and self._nodes['monitor'].code == 0
 
     def _clean_ends(self) -> bool:
         clean = True
@@ -97,10 +98,10 @@ class Run:
                 clean = False
         return clean
 
-    def _report(self) -> bool:
+    def _report(self, analyze: Sequence[str]) -> bool:
         log, report = self._log('analyze'), self._out / 'report.html'
-        command = [*program('maglev_monitor', 'analyze'), f'{self._out}/bag', '--out']
-        code = run_to_end([*command, str(self._out)], self._signals, log)
+        command = [*analyze, f'{self._out}/bag', '--out', str(self._out)]
+        code = run_to_end(command, self._signals, log)
         if code is None:
             return False
         if code > 1 or not report.is_file() or not report.stat().st_size:
@@ -108,10 +109,6 @@ class Run:
             self._complain(f'failed: no report: {lines[-1]}')
             return False
         return True
-
-    @property
-    def _measured(self) -> bool:
-        return (self._out / 'metrics.json').is_file()
 
     def _log(self, node: str) -> Path:
         return self._out / 'log' / f'{node}.log'
