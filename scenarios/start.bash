@@ -5,6 +5,11 @@
 #
 root=$(CDPATH='' cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd -P) || exit
 
+# Started with SIGINT ignored, as by `scenario.sh &` in a script, a shell could not be stopped by it.
+if [[ $(trap -p INT) == *"''"* ]] && env --default-signal=INT true 2>/dev/null; then
+  exec env --default-signal=INT "$BASH" "$0" "${@:2}"
+fi
+
 # The first set-up takes minutes: --help and wrong use are answered before it, where there is a
 # Python that can.
 if [[ ! -f $root/install/.stamp ]] &&

@@ -273,6 +273,20 @@ def test_an_interrupt_is_heeded_where_it_was_ignored(tree: Tree) -> None:
     assert tree.alive() == []
 
 
+def test_the_set_up_is_interrupted_where_that_was_ignored(tree: Tree) -> None:
+    (tree.path / 'setup.sh').write_text(f'echo >{tree.path}/pids/setup up; sleep 60\n')
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        process = tree.start('--out', str(tree.out))
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    tree.wait_started('setup')
+    (tree.path / 'pids' / 'setup').unlink()
+    os.killpg(process.pid, signal.SIGINT)
+    assert process.wait(timeout=10) == -signal.SIGINT
+    assert not tree.out.exists()
+
+
 def test_a_trajectory_is_chosen_by_name_or_file(tree: Tree) -> None:
     tree.parameters('params/scenario_file.yaml')
     code, output = tree.finish('ellipse', '--out', str(tree.out), script='trajectory')

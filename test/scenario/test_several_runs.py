@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import time
 from pathlib import Path
 
 import pytest
@@ -85,6 +86,7 @@ def test_a_signal_ends_the_run_in_progress_and_no_other_begins(
     process = papers.start('--out', str(papers.out), script='paper_tables')
     while len(papers.history('reference')) < 2:
         assert process.poll() is None
+        time.sleep(0.02)
     process.send_signal(number)
     output, _ = process.communicate(timeout=20)
     assert process.returncode == 128 + number

@@ -17,18 +17,19 @@ NODES = ('recorder', 'monitor', 'plant', 'controller', 'reference')
 # a file named after it, or after it and the folder of the run (monitor@steps): `die`, `stubborn`,
 # or, for the monitor, the exit code it ends with.
 STAND_IN = r"""#!/usr/bin/env bash
-name=${0##*/} tree=@TREE@ out=''
+name=${0##*/} tree=@TREE@ out='' what=''
 for word; do
   [[ $word != effective_parameters:=* ]] || out=${word#*:=} out=${out%/params/*}
 done
 echo "$name $*" >>"$tree/history"
 printf '%s\n' "$@" >"$tree/arguments/$name"
+for file in "$tree/behaviour/$name@${out##*/}" "$tree/behaviour/$name"; do
+  [[ ! -f $file || -n $what ]] || read -r what <"$file" || true
+done
 ended() { echo "$name" >>"$tree/ended"; exit "$1"; }
 trap 'ended 130' INT
 trap 'ended 143' TERM
-echo $$ >"$tree/pids/$name"
-told=$tree/behaviour/$name
-what=$(cat "$told@${out##*/}" 2>/dev/null || cat "$told" 2>/dev/null)
+echo $$ >"$tree/pids/$name" # from now on it can be told to end
 case $what in
   die) sleep 0.3; echo '[INFO] all well' >&2; echo 'error: the belt broke' >&2; exit 3 ;;
   stubborn) trap '' INT TERM ;;
@@ -128,7 +129,7 @@ class Tree:
 
     def wait_started(self, *names: str) -> None:
         """Wait until these are up, or all five nodes."""
-        deadline = time.monotonic() + 10.0
+        deadline = time.monotonic() + 30.0
         while not set(names or NODES) <= set(self.started()):
             assert time.monotonic() < deadline, self.started()
             time.sleep(0.02)
@@ -144,7 +145,7 @@ class Tree:
 
     def wait_gone(self) -> None:
         """Wait until no stand-in runs."""
-        deadline = time.monotonic() + 5.0
+        deadline = time.monotonic() + 20.0
         while self.alive():
             assert time.monotonic() < deadline, self.alive()
             time.sleep(0.02)
