@@ -24,7 +24,8 @@ from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.timeline import Timeline
-from maglev_study.closed_loop import References, Run, run
+from maglev_study.closed_loop import Run, run
+from maglev_study.references import References
 
 T = TypeVar('T')
 
