@@ -237,6 +237,8 @@ stage.close()' &
   in_environment python -c 'import maglev_study.closed_loop as loop
 import maglev_controller.node, maglev_plant.node, maglev_reference.node
 import maglev_monitor.bag.recorder, maglev_monitor.live.node, maglev_monitor.report.run_report
-loop.warm_up()' || echo 'not compiled'
+from maglev_reference import parameters, timeline
+loop.warm_up()
+timeline.Timeline(parameters.ReferenceParameters())' || echo 'not compiled'
   wait $! || echo 'not compiled'
 }

@@ -31,8 +31,8 @@ def motor_currents(
 ) -> tuple[FloatArray, FloatArray, npt.NDArray[np.bool_]]:
     """i_d and i_q of motors 1..4 (n, 4) [A] that samples (n, 5) take.
 
-    The third array (n,) tells where they do: elsewhere more attraction is wanted than there is. A
-    position beyond the stops, which no current has to do with, counts as the one at the stop.
+    The third array (n,) tells where there are such currents: elsewhere more attraction is wanted
+    than there is. Of a position beyond the stops, the currents are those at the stop.
     """
     machine = parameters.machine
     position = np.clip(samples.position, machine.lower_limit, machine.upper_limit)
