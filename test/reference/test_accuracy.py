@@ -165,15 +165,10 @@ def test_the_internal_model_is_the_controllers():
     assert table.fundamental == controller.internal_model.fundamental
     for axis, own in zip(('y', 'x', 'z', 'phi', 'theta'), controller.axes, strict=True):
         assert getattr(table, axis) == own.multiples
-        assert own.weight_error == pytest.approx(table.bandwidth**4, rel=0.02)
-        assert own.weight_rate == pytest.approx(2.0 * table.bandwidth**2, rel=0.02)
-        assert own.weight_model == pytest.approx(
-            (
-                table.bandwidth**4 * table.integration**2,
-                table.bandwidth**4 * table.learning**2,
-            ),
-            rel=0.02,
-        )
+        assert own.design == 'bandwidth'
+        assert own.bandwidth == table.bandwidth
+        assert own.integration == table.integration
+        assert own.learning == table.learning
 
 
 def test_the_ellipse_is_held():
