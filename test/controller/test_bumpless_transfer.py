@@ -43,7 +43,7 @@ def stage(plant: str, references: References) -> SimulatedStage:
 
 CHANGES: dict[str, dict[str, object]] = {
     'nothing': {},
-    'slower': {f'{a}.weight_error': 4e8 for a in ('y', 'x', 'z', 'phi', 'theta')},
+    'slower': {f'{a}.bandwidth': 140.0 for a in ('y', 'x', 'z', 'phi', 'theta')},
     'fewer frequencies': {f'{a}.multiples': (0.0, 1.0, 2.0) for a in ('y', 'x', 'theta')},
     'more frequencies': {f'{a}.multiples': tuple(map(float, range(8))) for a in ('y', 'z')},
     'no feed-forward': {'feed_forward': False},
@@ -103,7 +103,7 @@ def test_back_to_the_derivative_filter_and_forth() -> None:
 def test_on_the_ground_there_is_nothing_to_take_over() -> None:
     """Before the first sample a retuned regulator is a new one."""
     old = Regulator(ControllerParameters())
-    new = old.retuned(replace(old.parameters, {'y.weight_error': 1e9}))
+    new = old.retuned(replace(old.parameters, {'y.bandwidth': 180.0}))
     fresh = Regulator(new.parameters)
     for kept, begun in zip(new.save(), fresh.save(), strict=True):
         np.testing.assert_array_equal(kept, begun)
@@ -117,7 +117,7 @@ def test_on_the_ground_there_is_nothing_to_take_over() -> None:
         ({'phi.controlled': False}, "'phi.controlled' cannot change in flight"),
         ({'input_delay': 1}, "'input_delay' cannot change in flight"),
         ({'y.multiples': (0.0, 1.0, 1.0)}, 'y: .* given twice'),
-        ({'rate_estimate': 'derivative', 'x.weight_error': 1e13}, 'x: .* unstable'),
+        ({'rate_estimate': 'derivative', 'x.bandwidth': 1800.0}, 'x: .* unstable'),
     ],
 )
 def test_what_cannot_be_is_refused_and_changes_nothing(

@@ -196,14 +196,14 @@ def test_retuning_in_flight_is_checked_and_bumpless(
     watching.wait(lambda: watching.newest(REFERENCE) is not None)
     watching.wait(lambda: watching.newest(REFERENCE).phase == Reference.TRACK)
     for refused, said in (
-        ({'x__weight_error': 1e30}, 'weight_error'),
+        ({'x__bandwidth': 1e30}, 'bandwidth'),
         ({'machine__mass_y': 7.5}, 'mass_y'),
-        ({'y__weight_error': 'much'}, 'type'),
+        ({'y__bandwidth': 'much'}, 'type'),
     ):
         answer = watching.set_parameters('controller', **refused)
         assert not answer.successful
         assert said in answer.reason
-    done = watching.set_parameters('controller', y__weight_rate=6.0e4, x__weight_rate=6.0e4)
+    done = watching.set_parameters('controller', y__bandwidth=180.0, x__bandwidth=180.0)
     assert done.successful, done.reason
     after = watching.newest(CONTROLLER_STATE).sequence + 1000
     watching.wait(lambda: watching.newest(CONTROLLER_STATE).sequence > after)

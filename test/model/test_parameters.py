@@ -98,6 +98,17 @@ def test_yaml_carries_every_value_unchanged(
     assert parameters.from_yaml(Table, 'plant', path) == table
 
 
+def test_yaml_has_no_empty_list_by_default_as_ros_cannot_read_one() -> None:
+    @dataclass(frozen=True, kw_only=True)
+    class Poles:
+        real: tuple[float, ...] = parameter((), description='poles')
+        others: tuple[float, ...] = parameter((1.0,), description='others')
+
+    assert 'real' not in parameters.to_yaml(Poles(), 'controller')
+    assert 'real: [2.0]' in parameters.to_yaml(Poles(real=(2.0,)), 'controller')
+    assert 'others: []' in parameters.to_yaml(Poles(others=()), 'controller')
+
+
 def test_files_apply_to_their_node_and_the_later_wins(tmp_path: Path) -> None:
     first, second = tmp_path / 'a.yaml', tmp_path / 'b.yaml'
     first.write_text(

@@ -11,18 +11,6 @@ from maglev_model.loop_parameters import AxisLoopParameters, FundamentalParamete
 from maglev_model.machine import MachineParameters
 from maglev_model.parameters import group, parameter
 
-_UPPER_POLES = (
-    (-127.1, 77.51),
-    (-1.305, 23.13),
-    (-1.178, 18.47),
-    (-0.9852, 13.86),
-    (-0.7053, 9.272),
-    (-0.3645, 4.658),
-)
-POLES_REAL = (-148.6, *(real for real, _ in _UPPER_POLES for _ in range(2)))
-POLES_IMAGINARY = (0.0, *(sign * part for _, part in _UPPER_POLES for sign in (1.0, -1.0)))
-"""Where the default LQR weights put the closed-loop poles, rounded [rad/s]."""
-
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class AxisParameters(AxisLoopParameters):
@@ -33,33 +21,36 @@ class AxisParameters(AxisLoopParameters):
         description='whether the axis gets control; off: v_phi = v_theta = 0 as in the paper',
     )
     design: str = parameter(
-        'lqr_discrete',
+        'bandwidth',
         choices=('bandwidth', 'lqr_discrete', 'lqr_continuous', 'poles'),
         description='gains by discrete LQR with the weights that bandwidth, integration and '
         'learning stand for; by LQR with the weights weight_*; or from closed-loop poles',
     )
     poles_real: tuple[float, ...] = parameter(
-        POLES_REAL,
+        (),
         unit='rad/s',
         lower=-1e5,
         upper=0.0,
-        description='real parts of the closed-loop poles',
+        description='real parts of the closed-loop poles, for the design poles',
     )
     poles_imaginary: tuple[float, ...] = parameter(
-        POLES_IMAGINARY,
+        (),
         unit='rad/s',
         lower=-1e5,
         upper=1e5,
         description='their imaginary parts, in the same order',
     )
     weight_error: float = parameter(
-        1.6e9, lower=0.0, upper=1e15, description='LQR weight on e^2 [1/m^2 or 1/rad^2]'
+        0.0,
+        lower=0.0,
+        upper=1e15,
+        description='LQR weight on e^2, for the designs lqr_* [1/m^2 or 1/rad^2]',
     )
     weight_rate: float = parameter(
-        8e4, lower=0.0, upper=1e15, description='LQR weight on the error rate squared'
+        0.0, lower=0.0, upper=1e15, description='LQR weight on the error rate squared'
     )
     weight_model: tuple[float, ...] = parameter(
-        (1.3e13, 1.6e11),
+        (),
         lower=0.0,
         upper=1e18,
         description='LQR weight on the internal-model states: one for all; or of the integrator '

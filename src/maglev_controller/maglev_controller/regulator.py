@@ -17,23 +17,25 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from maglev_controller.bumpless_transfer import ModelMaps, carry_over, check_retuning, model_maps
+from maglev_controller.control_arrays import (
+    AXIS,
+    INVERSES,
+    MODEL,
+    RECORDS,
+    SAMPLE,
+    SETTINGS,
+    ControlArrays,
+)
 from maglev_controller.design.axis_design import AxisDesign
 from maglev_controller.design.margins import LoopMargins, all_margins, check_margins
 from maglev_controller.design.observer import NO_OBSERVER
 from maglev_controller.laws import control_law
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.sample_step import (
-    AXIS,
     BAD_REFERENCE,
-    INVERSES,
-    MODEL,
     NOT_FINITE,
-    RECORDS,
-    SAMPLE,
     SATURATED,
-    SETTINGS,
     WARPED,
-    ControlArrays,
     answer_sample,
 )
 from maglev_model.axes import AXES, FloatArray

@@ -1,18 +1,25 @@
 """One sample of the control law, compiled: (14), (16), (17) and an inverse.
 
-:class:`~maglev_controller.regulator.Regulator` fills the arrays and explains the law. What has one
-size is held in records whose fields have names; what grows with the order n of the internal models
-is held in arrays, so that no n needs machine code of its own.
+:class:`~maglev_controller.regulator.Regulator` fills the arrays and explains the law.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from maglev_controller.control_arrays import (
+    EXACT,
+    SIMPLIFIED,
+    ControlArrays,
+    Currents,
+    Reading,
+    Record,
+    Reference,
+)
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
 from maglev_model.equilibrium import equilibrium_inverse
@@ -21,98 +28,12 @@ from maglev_model.machine import Machine, machine_from_array
 from maglev_model.platen import outputs_from_gaps
 from maglev_model.quintic import quintic_to_zero, transition_time
 
-Record = Any
-"""An element of an array of records, whose fields compiled code reads and writes as attributes."""
-
 JUMP: Final = 2e-4
 """A change of the reference within one sample that its velocity does not explain [m, rad] and that
 counts as a jump; a reference without velocities can still move at 0.2 m/s."""
 
 LARGEST_REFERENCE: Final = 1e6
 """Sum of all the reference's magnitudes beyond which it is refused, like one that is not finite."""
-
-INVERSES: Final = ('simplified', 'exact', 'equilibrium')
-SIMPLIFIED: Final = 0
-EXACT: Final = 1
-
-SETTINGS: Final = np.dtype(
-    [
-        ('machine', 'f8', len(Machine._fields)),  # as machine_from_array takes it
-        ('period', 'f8'),  # [s]
-        ('controlled', 'f8', 5),  # 1, or 0 for an axis that gets no control
-        ('lower', 'f8', 5),  # outputs that are believed [m, rad]
-        ('upper', 'f8', 5),
-        ('warp', 'f8'),  # that is believed, at most [m]
-        ('inverse', 'i8'),  # one of INVERSES, by its number
-        ('equilibrium', 'f8'),  # air gap that is linearised about [m]
-        ('current', 'f8'),  # CurrentLimits
-        ('levitation_first', 'f8'),
-        ('least_attraction', 'f8'),
-        ('jump_time', 'f8'),  # [s]
-        ('jump_acceleration', 'f8', 5),
-        ('feed_forward', 'f8'),  # 1, or 0
-        ('error_gain', 'f8', 5),  # of w on e
-        ('rate_gain', 'f8', 5),  # of w on ė
-        ('error_limit', 'f8', 5),  # of the error that is fed back
-        ('learned_error', 'f8', 5),  # that an internal model learns from, at most
-        ('filter_gain', 'f8', 5),  # of the derivative filter [1/s]
-        ('filter_forget', 'f8', 5),
-        ('observed', 'i1', 5),  # whether the rate comes from the observer, not from the filter
-        ('observer_position', 'f8', 5),
-        ('observer_velocity', 'f8', 5),  # [1/s]
-        ('late', '?'),  # whether the currents come a sample late, and the observer predicts it
-        ('paper_antiwindup', '?'),
-        ('fade', 'f8'),  # what is left of a bump a sample later
-    ],
-    align=True,
-)
-
-AXIS: Final = np.dtype(
-    [
-        ('fresh', '?'),  # before the first sample
-        ('filtered_position', 'f8'),  # f of the derivative filter
-        ('filtered_velocity', 'f8'),  # of the reference, through the same filter
-        ('reference_position', 'f8'),  # of the last sample
-        ('reference_velocity', 'f8'),
-        ('reference_acceleration', 'f8'),
-        ('smooth_velocity', 'f8'),  # of the reference with jumps made good
-        ('transition_duration', 'f8'),  # of what makes a jump good [s]
-        ('transition_elapsed', 'f8'),
-        ('transition_position', 'f8'),  # at its start
-        ('transition_velocity', 'f8'),
-        ('transition_acceleration', 'f8'),
-        ('estimated_position', 'f8'),  # predicted for this sample
-        ('estimated_velocity', 'f8'),
-        ('pending_acceleration', 'f8'),  # commanded, and yet to act where the currents come late
-        ('error', 'f8'),  # of the last sample, as w used it
-        ('bump', 'f8'),  # part of w that fades, so that w does not jump when gains change
-    ],
-    align=True,
-)
-
-SAMPLE: Final = np.dtype(
-    [
-        ('output', 'f8', 5),  # what was measured, believed or not
-        ('position', 'f8', 5),
-        ('error', 'f8', 5),
-        ('error_rate', 'f8', 5),
-        ('virtual_input', 'f8', 5),  # w
-        ('internal_model', 'f8', 5),  # its part of w
-        ('learned_error', 'f8', 5),
-        ('realised', 'f8', 5),  # accelerations that the currents give
-        ('excess', 'f8', 2),  # sat(u) - u of u_x and u_z [A]
-    ],
-    align=True,
-)
-
-RECORDS: Final = np.dtype(
-    [('settings', SETTINGS), ('axes', AXIS, 5), ('sample', SAMPLE)], align=True
-)
-"""All of these in one: what is constant, what is remembered of an axis (but for ξ), what the last
-sample came to. Python hands over one array faster than three."""
-
-MODEL: Final = np.dtype([('output', 'f8'), ('drive', 'f8'), ('antiwindup', 'f8')], align=True)
-"""What belongs to one state of an internal model: elements of κ (Γ included), N_d and E_d."""
 
 # What a step returns; above SATURATED it is a fault.
 OK: Final = 0
@@ -121,53 +42,6 @@ NOT_FINITE: Final = 2
 WARPED: Final = 3
 OUT_OF_RANGE: Final = 4
 BAD_REFERENCE: Final = 5
-
-
-class ControlArrays(NamedTuple):
-    """What :func:`control_step` works on; n is the order of the largest internal model."""
-
-    records: NDArray[np.void]  # (1,) of RECORDS
-    models: NDArray[np.void]  # (5, n) of MODEL
-    transition: FloatArray  # Φ_d, (5, n, n)
-    xi: FloatArray  # ξ, (5, n)
-
-    @property
-    def settings(self) -> Record:
-        """The one of SETTINGS."""
-        return self.records[0]['settings']
-
-    @property
-    def axes(self) -> NDArray[np.void]:
-        """The five of AXIS."""
-        return self.records[0]['axes']  # type: ignore[no-any-return]
-
-    @property
-    def sample(self) -> Record:
-        """The one of SAMPLE."""
-        return self.records[0]['sample']
-
-
-class Reading(NamedTuple):
-    """What the encoders read."""
-
-    gap: FloatArray  # (4,) [m]
-    x: float  # [m]
-    z: float
-
-
-class Reference(NamedTuple):
-    """What the outputs shall be, (5,) each."""
-
-    position: FloatArray  # [m, rad]
-    velocity: FloatArray
-    acceleration: FloatArray
-
-
-class Currents(NamedTuple):
-    """The answer, of motors 1..4, (4,) each."""
-
-    direct: FloatArray  # [A]
-    quadrature: FloatArray
 
 
 @compiled

@@ -277,9 +277,15 @@ def from_yaml(cls: type[T], node: str, *paths: str | Path) -> T:
 
 
 def to_yaml(instance: Any, node: str) -> str:
-    """The whole table as a ROS parameter file for one node."""
+    """The whole table as a ROS parameter file for one node.
+
+    But for lists that are empty by default and still are: ROS cannot read an empty list.
+    """
     nested: dict[str, Any] = {}
+    table = specs(type(instance))
     for name, value in values(instance).items():
+        if value == () == table[name].default:
+            continue
         *groups, last = name.split('.')
         level = nested
         for part in groups:

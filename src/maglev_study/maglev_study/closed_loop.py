@@ -7,16 +7,10 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
+from maglev_controller.control_arrays import ControlArrays, Currents, Reading, Reference
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import MeasurementFault, Regulator
-from maglev_controller.sample_step import (
-    SATURATED,
-    ControlArrays,
-    Currents,
-    Reading,
-    Reference,
-    control_step,
-)
+from maglev_controller.sample_step import SATURATED, control_step
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
 from maglev_model.records import Block

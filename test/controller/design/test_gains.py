@@ -32,6 +32,7 @@ PUBLISHED = {
     'x': ([-38.73, -3.2, -3.2, -2.69, -2.69], [0.0, 5.89, -5.89, 2.23, -2.23]),
     'theta': ([-200.0, -2.81, -2.81, -2.19, -2.19], [0.0, 5.58, -5.58, 1.82, -1.82]),
 }
+WEIGHTS = {'design': 'lqr_discrete', 'weight_error': 1.6e9, 'weight_rate': 8e4}
 LQR = {
     'y': ((3e4, 3e4, 2.5e9, 2.5e7, 2.5e7), (-1699.7, -182.75, -50000.0, 2725.0, -7807.0)),
     'x': ((1.5e3, 1.5e3, 4.5e8, 2.25e6, 2.25e6), (-525.3, -50.5, -21213.0, -1254.0, -2742.0)),
@@ -138,9 +139,10 @@ def test_the_default_gain_is_python_controls() -> None:
     assert design.model is not None
     state, drive = augmented_discrete(design.model, PERIOD)
     own = ControllerParameters().y
-    integrator, oscillators = own.weight_model
-    cost = np.diag([own.weight_error, own.weight_rate, integrator] + [oscillators] * 10)
-    wanted = -control.dlqr(state, drive[:, None], cost, np.array([[own.weight_effort]]))[0][0]
+    fourth = own.bandwidth**4
+    integrator, oscillators = fourth * own.integration**2, fourth * own.learning**2
+    cost = np.diag([fourth, 2.0 * own.bandwidth**2, integrator] + [oscillators] * 10)
+    wanted = -control.dlqr(state, drive[:, None], cost, np.eye(1))[0][0]
     untouched = design_axis(axis_parameters(internal_model__friction_slope=0.0), 'y')
     np.testing.assert_allclose(feedback(untouched), wanted, rtol=1e-4, atol=10.0)
     np.testing.assert_allclose(feedback(design)[:3], wanted[:3], rtol=1e-5)
@@ -240,8 +242,15 @@ def test_antiwindup_observer_lets_go_and_does_not_ring() -> None:
             },
             'y: closed-loop poles need real parts below 0',
         ),
-        ({'weight_model': (0.0,)}, "y: .* 'weight_model' must be above 0"),
-        ({'weight_model': (1.0, 2.0, 3.0)}, "y: 'weight_model' has 3 elements.* 1, 2 or 6"),
+        ({**WEIGHTS, 'weight_model': (0.0,)}, "y: .* 'weight_model' must be above 0"),
+        (
+            {**WEIGHTS, 'weight_model': (1.0, 2.0, 3.0)},
+            "y: 'weight_model' has 3 elements.* 1, 2 or 6",
+        ),
+        ({**WEIGHTS, 'weight_model': ()}, "y: 'weight_model' has 0 elements.* 1, 2 or 6"),
+        ({'design': 'lqr_continuous'}, "y: .*'lqr_continuous' takes 'weight_error' above 0"),
+        ({'weight_rate': 8e4}, "y: 'weight_rate' is given, which .*'bandwidth' does not take"),
+        ({'design': 'poles'}, 'y: 0 closed-loop poles given, this internal model takes 13'),
         ({'design': 'bandwidth', 'internal_model__form': 'companion'}, "'companion' does not tell"),
         ({'antiwindup': (1.0, 2.0)}, "y: 'antiwindup' has 2 elements"),
         ({'internal_model__fundamental': 900.0}, 'more than half of what a sample time'),
@@ -253,10 +262,22 @@ def test_what_cannot_be_stabilised_is_refused(overrides: dict[str, object], reas
         design_axis(axis_parameters(**overrides), 'y')
 
 
-def test_default_poles_do_what_the_default_weights_do() -> None:
-    """Switching the design to poles keeps the loop nearly the same."""
+def test_the_default_s_poles_give_the_default_s_gains() -> None:
+    """Designing by its poles, rounded, keeps the loop nearly the same."""
+    upper = [
+        (-127.1, 77.51),
+        (-1.305, 23.13),
+        (-1.178, 18.47),
+        (-0.9852, 13.86),
+        (-0.7053, 9.272),
+        (-0.3645, 4.658),
+    ]
+    poles = {
+        'z.poles_real': (-148.6, *(real for real, _ in upper for _ in range(2))),
+        'z.poles_imaginary': (0.0, *(sign * part for _, part in upper for sign in (1.0, -1.0))),
+    }
     by_weights = design_axis(ControllerParameters(), 'z')
-    by_poles = design_axis(build(ControllerParameters, {'z.design': 'poles'}), 'z')
+    by_poles = design_axis(build(ControllerParameters, {'z.design': 'poles', **poles}), 'z')
     np.testing.assert_allclose(feedback(by_poles)[:3], feedback(by_weights)[:3], rtol=0.02)
 
 
@@ -265,10 +286,13 @@ def test_two_weights_are_of_the_integrator_and_of_the_oscillators(
     multiples: tuple[float, ...],
 ) -> None:
     """Whichever frequencies there are."""
-    integrator, oscillator = ControllerParameters().y.weight_model
+    integrator, oscillator = 1.3e13, 1.6e11
     each = tuple(integrator if multiple == 0.0 else oscillator for multiple in multiples)
-    two = design_axis(axis_parameters(multiples=multiples), 'y')
+    both = WEIGHTS | {'weight_model': (integrator, oscillator)}
+    two = design_axis(axis_parameters(multiples=multiples, **both), 'y')
     if len(multiples) == 2:
         each = (each[0],) if each[0] == each[1] else each
-    wanted = design_axis(axis_parameters(multiples=multiples, weight_model=each), 'y')
+    wanted = design_axis(
+        axis_parameters(multiples=multiples, **WEIGHTS | {'weight_model': each}), 'y'
+    )
     np.testing.assert_array_equal(two.gain, wanted.gain)

@@ -31,6 +31,13 @@ def parameters(*overlays: str, **overrides: object) -> ControllerParameters:
     return build(ControllerParameters, found)
 
 
+def weights(axis: str, **changes: object) -> dict[str, object]:
+    """An axis designed by LQR weights, dots written ``__``."""
+    chosen = {'error': 1.6e9, 'rate': 8e4, 'model': (1.3e13, 1.6e11), **changes}
+    named = {f'{axis}__weight_{name}': value for name, value in chosen.items()}
+    return {f'{axis}__design': 'lqr_discrete', **named}
+
+
 CHOICES = [
     parameters(),
     parameters(input_delay=1),
@@ -108,7 +115,7 @@ def test_friction_at_rest_leaves_the_default_stable(slope: float, delay: int) ->
 
 def test_oscillators_with_the_lqrs_own_phase_hunt_with_friction_at_rest() -> None:
     """The slope of the benchmark plant's tilts, 1320 1/s, is enough; half-way turned it is not."""
-    alike: dict[str, object] = {'theta__weight_model': (5e10,)}
+    alike = weights('theta', model=(5e10,))
     own = design_axis(parameters(**alike, internal_model__friction_slope=0.0), 'theta')
     turned = design_axis(parameters(**alike), 'theta')
     radius = []
@@ -148,7 +155,7 @@ def test_designing_for_the_delay_gives_margin_back() -> None:
     ('overrides', 'reason'),
     [
         (
-            {'rate_estimate': 'derivative', 'y__weight_error': 1e13},
+            {'rate_estimate': 'derivative', **weights('y', error=1e13)},
             'y: with these gains .* unstable at a sample time of 0.001 s',
         ),
         (
@@ -165,11 +172,7 @@ def test_designing_for_the_delay_gives_margin_back() -> None:
         ({'margins__gain': 6.0}, r"y: the gain margin is a factor 3\.\d+, 'margins.gain' asks for"),
         ({'margins__sensitivity': 1.2}, r"y: the sensitivity peaks at 1\.6\d, 'margins.sensi"),
         (
-            {
-                'theta__weight_error': 1e8,
-                'theta__weight_rate': 2e4,
-                'theta__weight_model': (1e10,),
-            },
+            weights('theta', error=1e8, rate=2e4, model=(1e10,)),
             'theta: standing still hunts with friction steeper',
         ),
         ({'rate_estimate': 'derivative', 'input_delay': 1}, "y: the phase .* 'margins.override'"),
@@ -188,7 +191,7 @@ def test_what_falls_short_is_refused(overrides: dict[str, object], reason: str) 
 
 def test_an_axis_without_control_is_not_judged() -> None:
     """Its gains are not used."""
-    wild = {'phi__weight_error': 1e13, 'phi__controlled': False}
+    wild = {**weights('phi', error=1e13), 'phi__controlled': False}
     assert len(Regulator(parameters(**wild)).describe_loops()) == 4
 
 

@@ -94,9 +94,19 @@ def _gain(chosen: AxisParameters, model: InternalModel, period: float, axis: str
 
 def _weights(chosen: AxisParameters, model: InternalModel, axis: str) -> Weights:
     if chosen.design != 'bandwidth':
+        if chosen.weight_error == 0.0:
+            raise ParameterError(
+                f"{axis}: the design '{chosen.design}' takes 'weight_error' above 0, none is given"
+            )
         return Weights(
             chosen.weight_error, chosen.weight_rate, chosen.weight_model, chosen.weight_effort
         )
+    for name in ('weight_error', 'weight_rate', 'weight_model'):
+        if getattr(chosen, name):
+            raise ParameterError(
+                f"{axis}: '{name}' is given, which the design 'bandwidth' does not take; give "
+                "'bandwidth', 'integration' and 'learning', or set 'design' to 'lqr_discrete'"
+            )
     if model.form != 'modal':
         raise ParameterError(
             f"{axis}: the design 'bandwidth' weighs integrator and oscillators, which an "
