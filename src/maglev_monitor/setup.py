@@ -20,6 +20,7 @@ setup(
         'console_scripts': [
             'monitor = maglev_monitor.live.node:main',
             'recorder = maglev_monitor.bag.recorder:main',
+            'compare_bags = maglev_monitor.bag.compare_cli:main',
             'analyze = maglev_monitor.report.analyze_cli:main',
         ]
     },
