@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import resource
 import shutil
@@ -15,6 +16,7 @@ import made_up_run
 import numpy as np
 import pytest
 from made_up_run import MESSAGES, TOPICS, open_bag, write_samples
+from mcap.reader import make_reader
 from mcap.writer import MCAP0_MAGIC
 from rosbags.interfaces import (
     Qos,
@@ -27,6 +29,7 @@ from rosbags.interfaces import (
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 
 from maglev_monitor.bag.analysis import analyse
+from maglev_monitor.bag.chunk_file import ChunkFile
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.mcap_file import McapFile
 from maglev_monitor.bag.reader import Bag
@@ -292,6 +295,69 @@ def test_a_file_that_may_not_grow_is_finished_as_it_was(tmp_path: Path) -> None:
     with Reader(path) as reader:
         assert reader.message_count == sum(counts.values()) > 2000
         assert sum(1 for _ in reader.messages()) == reader.message_count
+
+
+def test_a_chunk_that_cannot_be_written_is_lost_alone(
+    tmp_path: Path,
+    run: Any,
+    messages: dict[str, list[bytes]],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    writer = open_bag(tmp_path / 'bag')
+    write_samples(writer, run, messages)
+    writer.flush()
+    disk_full = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    write = ChunkFile.write
+
+    def half(file: ChunkFile, data: bytes) -> int:
+        write(file, data[: len(data) // 2])
+        raise disk_full
+
+    monkeypatch.setattr(ChunkFile, 'write', half)
+    writer.write('/reference', [(messages['reference'][0], 1)])
+    with pytest.raises(BagError, match=r'cannot write the bag .*: no space left on device'):
+        writer.flush()
+    with pytest.raises(BagError, match='analyze can recover it'):
+        writer.close()
+    writer.close()
+    counts, notes = read(tmp_path / 'bag')
+    assert counts == {key: len(run) for key in TOPICS}
+    assert len(notes) == 1
+    assert analyse(tmp_path / 'bag').result['verdict'] == 'pass'
+
+
+def test_files_of_a_bag_are_read_in_the_order_of_their_numbers(
+    tmp_path: Path, run: Any, messages: dict[str, list[bytes]]
+) -> None:
+    (tmp_path / 'bag').mkdir()
+    for number in range(12):
+        writer = open_bag(tmp_path / f'part{number}')
+        part = slice(100 * number, 100 * (number + 1))
+        stamps = run.stamp[part].tolist()
+        writer.write('/stage/currents', zip(messages['currents'][part], stamps, strict=True))
+        writer.close()
+        file = tmp_path / f'part{number}' / f'part{number}_0.mcap'
+        file.rename(tmp_path / 'bag' / f'bag_{number}.mcap')
+    sequence = [batch.samples['currents']['sequence'] for batch in Bag(tmp_path / 'bag').batches()]
+    np.testing.assert_array_equal(np.concatenate(sequence), np.arange(len(run)))
+
+
+@pytest.mark.parametrize('length', [2**31, 2**45, 2**63, 2**64 - 1])
+def test_a_length_that_cannot_be_ends_the_reading(
+    length: int, bag: Path, tmp_path: Path, run: Any
+) -> None:
+    content = bytearray((bag / 'bag_0.mcap').read_bytes())
+    with (bag / 'bag_0.mcap').open('rb') as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    start = summary.chunk_indexes[1].chunk_start_offset
+    for name, place in (('record', start + 1), ('data', start + 9 + 28 + 4)):
+        damaged = content.copy()
+        damaged[place : place + 8] = length.to_bytes(8, 'little')
+        (tmp_path / f'{name}.mcap').write_bytes(damaged)
+        counts, notes = read(tmp_path / f'{name}.mcap')
+        assert 0 < counts['plant'] < len(run)
+        assert 'recovered' in notes[0]
 
 
 def test_reading_knows_a_whole_file(bag: Path) -> None:

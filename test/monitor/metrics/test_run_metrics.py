@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import json
 from typing import Any
 
 import control
@@ -77,6 +78,19 @@ def test_without_the_true_state_errors_are_of_the_measured_position(
         wanted = pytest.approx(true['axes'][axis]['rms_error'], rel=1e-9)
         assert found['axes'][axis]['rms_error'] == wanted
     assert found['missing_samples'] == 0
+
+
+def test_gaps_that_no_tilt_can_make_never_pass(records: dict[str, Records]) -> None:
+    del records['plant']
+    records['measurement'] = records['measurement'].copy()
+    records['measurement']['gap'][[900, 620], 1] += 1.0
+    found = figures(records, with_limits(max_error=(9.0,) * 5, max_settling_time=0.2))
+    assert set(found['axes']['theta'].values()) == {None}
+    assert found['axes']['phi']['max_abs_error'] < 1e-2
+    assert found['verdict'] == 'fail'
+    assert 'largest |e| of theta was not measured: its gaps cannot be' in found['reasons']
+    assert found['steps'][1]['settling_time'] >= 0.021
+    json.dumps(found, allow_nan=False)
 
 
 def test_currents_and_timing(run: Any, records: dict[str, Records]) -> None:

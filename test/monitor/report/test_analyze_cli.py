@@ -153,6 +153,13 @@ def test_parameters_survive_the_bag() -> None:
     assert run_from_json(run_to_json(parameters)) == parameters
 
 
+def test_a_bag_with_former_names_of_parameters_is_analysed() -> None:
+    former = '{"scenario":"old","metrics.radius":0.4,"metrics.pole_pitch":0.06}'
+    run = run_from_json(former)
+    assert (run.scenario, run.machine.radius, run.machine.pole_pitch) == ('old', 0.4, 0.06)
+    assert json.loads(run_to_json(run)).keys().isdisjoint({'metrics.radius', 'metrics.pole_pitch'})
+
+
 @pytest.mark.parametrize('text', ['', '[]', '{"nothing": 1}', '{"metrics.radius": -1.0}'])
 def test_damaged_parameters_are_refused(text: str) -> None:
     with pytest.raises(ParameterError):

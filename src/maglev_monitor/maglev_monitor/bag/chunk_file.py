@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import errno
-import os
+import resource
 from pathlib import Path
-
-_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 class ChunkFile:
@@ -48,15 +45,10 @@ class ChunkFile:
         self._file.seek(self.whole)
         self.position = self.whole
 
-    def claim(self, room: int) -> None:
-        """Find out that the file may still grow by as much [bytes]; otherwise raise OSError."""
-        try:
-            os.posix_fallocate(self._file.fileno(), self.position, room)
-        except OSError as error:
-            if error.errno in _FULL:  # otherwise this file system cannot tell
-                raise
-        finally:
-            self._file.truncate(self.position)
+    def may_grow(self, size: int) -> bool:
+        """Whether the process's limit lets the file grow by as much [bytes]."""
+        limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
+        return limit == resource.RLIM_INFINITY or self.position + size <= limit
 
     def close(self) -> None:
         """May be called twice."""

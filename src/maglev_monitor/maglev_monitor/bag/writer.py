@@ -18,7 +18,7 @@ from maglev_monitor.bag.definitions import Definitions, FindMessages
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.rosbag2_metadata import Topic, as_yaml, bag_information, offered_qos
 
-_CHUNK_BYTES = 1 << 18
+_CHUNK_BYTES = 1 << 19
 _SPARE_BYTES = 4 << 20  # what must be left on the disk, for other files as well
 _INDEX_BYTES = 1 << 16  # more than schemas, channels and metadata take at the end of a bag
 _INDEX_BYTES_PER_CHUNK = 1 << 9
@@ -166,9 +166,10 @@ class BagWriter:
         self._file.keep()
         self._chunks += 1
         index = _INDEX_BYTES + _INDEX_BYTES_PER_CHUNK * self._chunks
+        if not self._file.may_grow(_CHUNK_BYTES * 5 // 4 + index):  # with the chunk's own index
+            raise self._cannot_write(OSError(errno.EFBIG, os.strerror(errno.EFBIG)))
         try:
             free = shutil.disk_usage(self.path).free
-            self._file.claim(2 * _CHUNK_BYTES + index)
         except OSError as error:
             raise self._cannot_write(error) from error
         if free < _SPARE_BYTES:

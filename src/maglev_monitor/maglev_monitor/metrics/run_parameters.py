@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Mapping
 from typing import Any
 
 from maglev_model.machine import MachineParameters
@@ -123,10 +122,10 @@ def run_from_json(text: str) -> RunParameters:
     Raises ParameterError for anything else.
     """
     try:
-        found: Any = json.loads(text)
+        found: object = json.loads(text)
     except ValueError as error:
         raise ParameterError(f'the parameters of the run are no JSON: {error}') from error
-    if not isinstance(found, Mapping):
+    if not isinstance(found, dict):
         raise ParameterError('the parameters of the run are no JSON object')
-    named = {str(_FORMER_NAMES.get(str(name), name)): value for name, value in found.items()}
+    named = {str(_FORMER_NAMES.get(name, name)): value for name, value in found.items()}
     return build(RunParameters, named)

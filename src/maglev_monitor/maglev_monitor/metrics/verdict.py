@@ -47,15 +47,17 @@ def _axis_reasons(found: Mapping[str, Any], limits: RunLimits) -> Iterator[str]:
         ('mean_abs_error', 'mean |e|', limits.max_mean_error),
         ('max_abs_error', 'largest |e|', limits.max_error),
     )
+    tracked = found['axes']['y']['mean_abs_error'] is not None
     for name, title, bounds in rows:
         for axis, bound in zip(AXES, bounds, strict=True):
             value = found['axes'][axis][name]
-            if value is None and found['steps']:
+            if not tracked and found['steps']:
                 continue  # a run of steps tracks nothing
             if bound < 0 or (value is not None and value <= bound):
                 continue
             if value is None:
-                yield f'{title} of {axis} was not measured: no tracking'
+                why = 'its gaps cannot be' if tracked else 'no tracking'
+                yield f'{title} of {axis} was not measured: {why}'
             else:
                 shown, allowed = angle_or_length(axis, value), angle_or_length(axis, bound)
                 yield f'{title} of {axis} is {shown}, allowed is {allowed}'
