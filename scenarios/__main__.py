@@ -3,7 +3,9 @@
 import signal
 import sys
 
-signal.signal(signal.SIGINT, signal.SIG_DFL)  # until a run heeds it
+# Until a run heeds it. It comes in blocked: see start.bash.
+signal.signal(signal.SIGINT, signal.SIG_DFL)
+signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
 
 from runner.commands import main  # noqa: E402
 

@@ -21,4 +21,7 @@ fi
 
 # shellcheck source=setup.sh
 . "$root/setup.sh" || exit
-exec python "$root/scenarios" "$@"
+# A Ctrl-C that finds Python starting waits until it can be heeded.
+block=()
+! env --block-signal=INT true 2>/dev/null || block=(env --block-signal=INT)
+exec "${block[@]}" python "$root/scenarios" "$@"

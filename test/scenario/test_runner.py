@@ -283,8 +283,20 @@ def test_the_set_up_is_interrupted_where_that_was_ignored(tree: Tree) -> None:
     tree.wait_started('setup')
     (tree.path / 'pids' / 'setup').unlink()
     os.killpg(process.pid, signal.SIGINT)
-    assert process.wait(timeout=10) == -signal.SIGINT
+    output, _ = process.communicate(timeout=20)
+    assert process.returncode == -signal.SIGINT, output
     assert not tree.out.exists()
+
+
+def test_an_interrupt_while_python_starts_is_heeded(tree: Tree) -> None:
+    late = tree.path / 'late' / 'sitecustomize.py'
+    late.parent.mkdir()
+    late.write_text('import os, signal\nos.kill(os.getpid(), signal.SIGINT)\n')
+    with (tree.path / 'setup.sh').open('a') as file:
+        file.write(f'PYTHONPATH={late.parent}:$PYTHONPATH\n')
+    code, output = tree.run()
+    assert (code, output) == (-signal.SIGINT, '')
+    assert tree.started() == []
 
 
 def test_a_trajectory_is_chosen_by_name_or_file(tree: Tree) -> None:
