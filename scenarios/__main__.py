@@ -3,9 +3,7 @@
 import signal
 import sys
 
-# Until a run heeds it. It comes in blocked: see start.bash.
-signal.signal(signal.SIGINT, signal.SIG_DFL)
-signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
+signal.signal(signal.SIGINT, signal.SIG_DFL)  # until a run heeds it
 
 from runner.commands import main  # noqa: E402
 

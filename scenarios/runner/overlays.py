@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import site
+import sys
 from pathlib import Path
 
 from runner.options import WrongUseError
@@ -26,7 +28,9 @@ def overlay(option: str, name: str) -> str:
 
 def check_overlay(path: str) -> None:
     """Refuse a file that no node would take, or that speaks to none. Needs the environment."""
-    import yaml  # these two take as long to load as all else
+    if sys.flags.no_site:
+        site.main()
+    import yaml
 
     from maglev_model.parameters import ParameterError, read_yaml
 

@@ -288,17 +288,6 @@ def test_the_set_up_is_interrupted_where_that_was_ignored(tree: Tree) -> None:
     assert not tree.out.exists()
 
 
-def test_an_interrupt_while_python_starts_is_heeded(tree: Tree) -> None:
-    late = tree.path / 'late' / 'sitecustomize.py'
-    late.parent.mkdir()
-    late.write_text('import os, signal\nos.kill(os.getpid(), signal.SIGINT)\n')
-    with (tree.path / 'setup.sh').open('a') as file:
-        file.write(f'PYTHONPATH={late.parent}:$PYTHONPATH\n')
-    code, output = tree.run()
-    assert (code, output) == (-signal.SIGINT, '')
-    assert tree.started() == []
-
-
 def test_a_trajectory_is_chosen_by_name_or_file(tree: Tree) -> None:
     tree.parameters('params/scenario_file.yaml')
     code, output = tree.finish('ellipse', '--out', str(tree.out), script='trajectory')
