@@ -38,7 +38,8 @@ def check_overlay(path: str) -> None:
         read_yaml(path, '')
     except ParameterError as error:
         raise WrongUseError(f'--params: {error}') from error
-    content = yaml.compose(Path(path).read_text(encoding='utf-8'), Loader=yaml.SafeLoader)
+    loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+    content = yaml.compose(Path(path).read_text(encoding='utf-8'), Loader=loader)
     for key, _ in content.value if content else ():
         if key.value.lstrip('/') not in SECTIONS:
             raise WrongUseError(
