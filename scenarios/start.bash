@@ -15,10 +15,11 @@ fi
 if [[ ! -f $root/install/.stamp ]] &&
   python3 -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2>/dev/null; then
   code=0
-  python3 "$root/scenarios" --check "$@" || code=$?
+  python3 -S "$root/scenarios" --check "$@" || code=$?
   ((code == 75)) || exit "$code"
 fi
 
 # shellcheck source=setup.sh
 . "$root/setup.sh" || exit
-exec python "$root/scenarios" "$@"
+# -S: the packages of .venv take longer to find than all else, and are only needed for overlays.
+exec python -S "$root/scenarios" "$@"

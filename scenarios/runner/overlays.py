@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import site
+import sys
 from pathlib import Path
 
 from runner.options import WrongUseError
@@ -26,7 +28,9 @@ def overlay(option: str, name: str) -> str:
 
 def check_overlay(path: str) -> None:
     """Refuse a file that no node would take, or that speaks to none. Needs the environment."""
-    import yaml  # these two take as long to load as all else
+    if sys.flags.no_site:
+        site.main()
+    import yaml
 
     from maglev_model.parameters import ParameterError, read_yaml
 
@@ -34,7 +38,8 @@ def check_overlay(path: str) -> None:
         read_yaml(path, '')
     except ParameterError as error:
         raise WrongUseError(f'--params: {error}') from error
-    content = yaml.compose(Path(path).read_text(encoding='utf-8'), Loader=yaml.SafeLoader)
+    loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+    content = yaml.compose(Path(path).read_text(encoding='utf-8'), Loader=loader)
     for key, _ in content.value if content else ():
         if key.value.lstrip('/') not in SECTIONS:
             raise WrongUseError(
