@@ -31,7 +31,7 @@ def colcon(workspace: Path, *arguments: str) -> subprocess.CompletedProcess[str]
         env={name: value for name, value in os.environ.items() if name not in ours},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=300,
         check=False,
     )
 

@@ -86,9 +86,9 @@ def test_pip_installs_the_packages_and_six_lines_fly_the_ellipse(
     pip = [sys.executable, '-I', '-m', 'pip', '--python', python, '--isolated', 'install']
     offline = ['--no-index', '--no-deps', '--no-build-isolation', '--no-compile', '--quiet']
     folders = [tmp_path / package for package in PURE]
-    installed = run([*pip, *offline, *folders], tmp_path, 120.0)
+    installed = run([*pip, *offline, *folders], tmp_path, 300.0)
     assert installed.returncode == 0, installed.stderr
-    flown = run([python, '-c', NO_ROS + SIX_LINES], tmp_path, 180.0)
+    flown = run([python, '-c', NO_ROS + SIX_LINES], tmp_path, 300.0)
     assert flown.returncode == 0, flown.stderr
     assert re.fullmatch(
         r'y: 1\.[45]\d\nx: 1\.[45]\d\nz: 1\.[45]\d\nphi: 0\.00\ntheta: 0\.00\n', flown.stdout
