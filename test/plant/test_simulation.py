@@ -175,9 +175,9 @@ def test_bad_currents_are_refused_and_the_last_good_ones_held(
 
 def test_written_arrays_may_be_reused() -> None:
     stage = _stage()
-    mine = np.full(4, 0.1)
-    stage.write(mine, mine)
-    mine[:] = 9.0
+    command = np.full(4, 0.1)
+    stage.write(command, command)
+    command[:] = 9.0
     stage.read()
     stage.read()
     assert list(stage.direct_current) == [0.1] * 4
