@@ -18,7 +18,12 @@ from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
 
 QUICK = {'landing.braking_time': 0.05, 'landing.descent_time': 0.2, 'landing.settle_time': 0.05}
-PATIENT = {'boards.watchdog': 0.2, 'boards.overrun': 0.2, 'emulation.patience': 0.2}
+PATIENT = {
+    'boards.watchdog': 1.0,
+    'boards.overrun': 1.0,
+    'boards.buffer': 1000,
+    'emulation.patience': 0.2,
+}
 BRIDGE = build(BridgeParameters, {**HOME, **QUICK, **PATIENT})
 STAGES: dict[str, Callable[[], Stage]] = {
     'plant': lambda: SimulatedStage(build(PlantParameters, {'watchdog': 0.005})),

@@ -48,12 +48,12 @@ def free_ports(domain: int) -> None:
 def _locked(domain: int) -> set[str]:
     """Names of the domain's ports whose lock, a POSIX semaphore, is at 0."""
     first = _FIRST_PORT + _PORTS * domain
-    found = set()
+    names = set()
     for entry in os.scandir(_SHARED_MEMORY):
         match = _LOCK.fullmatch(entry.name)
         if match and first <= int(match[2]) < first + _PORTS:
             with contextlib.suppress(OSError):
                 content = Path(entry.path).read_bytes()
                 if len(content) >= 4 and int.from_bytes(content[:4], sys.byteorder) == 0:
-                    found.add(match[1])
-    return found
+                    names.add(match[1])
+    return names

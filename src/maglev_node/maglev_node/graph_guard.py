@@ -47,10 +47,10 @@ class GraphGuard:
 
     def alone(self) -> bool:
         """Whether what was claimed still has one publisher; otherwise the node ends."""
-        found = self._node.get_publishers_info_by_topic(self._topic)
-        if len(found) > 1:
-            self._node.fail(self._taken(self._topic, self._kind, found[0].node_name))
-        return len(found) <= 1
+        publishers = self._node.get_publishers_info_by_topic(self._topic)
+        if len(publishers) > 1:
+            self._node.fail(self._taken(self._topic, self._kind, publishers[0].node_name))
+        return len(publishers) <= 1
 
     def on_probation(self) -> bool:
         """Whether the node is so young that another of its kind may yet be discovered."""
