@@ -72,7 +72,7 @@ def main() -> int:
     following, landing = bridge(), bridge()
     samples(landing, 2)
     landing.land('benchmark')
-    landing.landing.arrays.timing[2] = 1e6  # a descent without end
+    landing.landing.arrays.descent_time = 1e6  # a descent without end
     plant = SimulatedStage(PlantParameters())
     gc.collect()
     gc.freeze()

@@ -18,32 +18,22 @@ from scipy.integrate import solve_ivp
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
+from maglev_model.compiled import compiled
 from maglev_model.machine import machine_from_array
 from maglev_model.parameters import build, read_yaml
-from maglev_plant.arrays import STATE
+from maglev_model.records import Block
+from maglev_plant.arrays import StageArrays
 from maglev_plant.dynamics import derivative
 from maglev_plant.encoder import encode
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
-from maglev_study.closed_loop import References, run, warm_up
+from maglev_study.closed_loop import run, warm_up
+from maglev_study.references import References, ellipse
 
 REAL_TIME_FACTOR = 100.0
 SCIPY_RATIO = 30.0
+THETA = 0.010  # amplitude of the ellipse in 4DOF [rad]
 BENCHMARK = Path(__file__).parents[1] / 'params' / 'benchmark.yaml'
-
-
-def ellipse(samples: int, period: float) -> References:
-    """The paper's 4DOF reference at 1.5π rad/s, from its start on."""
-    omega = 1.5 * math.pi
-    offset = np.array([0.025, 0.0, 0.0, 0.0, 0.0])
-    amplitude = np.array([0.005, 0.03, 0.03, 0.0, 0.01])
-    angle = omega * period * np.arange(samples)[:, None]
-    angle = angle + np.array([-0.5 * math.pi, -0.5 * math.pi, 0.0, 0.0, 0.0])
-    return References(
-        position=offset + amplitude * np.sin(angle),
-        velocity=amplitude * omega * np.cos(angle),
-        acceleration=-amplitude * omega**2 * np.sin(angle),
-    )
 
 
 def stage_at(references: References) -> SimulatedStage:
@@ -62,26 +52,32 @@ def compiled_loop(references: References) -> tuple[float, np.ndarray]:
     return time.perf_counter() - start, np.asarray(outcome.output)
 
 
+@compiled
+def state_rate(block: Block, state: np.ndarray, current: np.ndarray, rate: np.ndarray) -> None:
+    """Write the rate of change of a stage's state, all (10,), with currents (8,) flowing."""
+    stage: StageArrays = block[0]
+    derivative(stage, machine_from_array(stage.machine), 0.0, state, current, rate)
+
+
 def scipy_loop(references: References) -> tuple[float, np.ndarray]:
     """The same with an adaptive integrator, without stops and amplifier limits, not met here."""
     stage, regulator = stage_at(references), Regulator(ControllerParameters())
-    scalars, axes, memory, _, reading = stage.arrays
-    machine = machine_from_array(scalars)
+    arrays = stage.arrays
     period = stage.parameters.sample_time
     lag_rate = 2.0 * math.pi * stage.parameters.amplifier.bandwidth
-    state = memory[STATE : STATE + 10]
+    state, reading = arrays.state, arrays.reading
     current, target, rate = np.zeros(8), np.zeros(8), np.zeros(10)
     outputs = np.empty_like(references.position)
 
     def right_hand_side(elapsed: float, y: np.ndarray) -> np.ndarray:
         flowing = target + (current - target) * math.exp(-lag_rate * elapsed)
-        derivative(scalars, axes, machine, 0.0, y, flowing, rate)
+        state_rate(arrays.block, y, flowing, rate)
         return np.array(rate)
 
     start = time.perf_counter()
     for k, reference in enumerate(zip(*references, strict=True)):
         outputs[k] = state[::2]
-        encode(scalars, memory, reading)
+        encode(arrays.block)
         regulator.step(reading[:4], reading[4], reading[5], *reference, target[:4], target[4:])
         solution = solve_ivp(right_hand_side, (0.0, period), state, rtol=1e-8, atol=1e-11)
         state[:] = solution.y[:, -1]
@@ -97,11 +93,11 @@ def main() -> int:
     arguments = parser.parse_args()
     period = ControllerParameters().sample_time
     warm_up()
-    scipy_loop(ellipse(2, period))
+    scipy_loop(ellipse(2.0 * period, THETA, period))
 
-    long_run = ellipse(round(arguments.duration / period), period)
+    long_run = ellipse(arguments.duration, THETA, period)
     seconds = min(compiled_loop(long_run)[0] for _ in range(3)) / arguments.duration
-    short_run = ellipse(round(arguments.scipy_duration / period), period)
+    short_run = ellipse(arguments.scipy_duration, THETA, period)
     scipy_time, scipy_outputs = scipy_loop(short_run)
     scipy_seconds = scipy_time / arguments.scipy_duration
     apart = np.abs(scipy_outputs - compiled_loop(short_run)[1]).max()

@@ -14,53 +14,44 @@ import sys
 import numpy as np
 
 from maglev_hw_bridge.drivers.emulated import EmulatedDriver
-from maglev_hw_bridge.landing import currents, impact_of_cut
-from maglev_hw_bridge.opening import open_stage
+from maglev_hw_bridge.landing import impact_of_cut
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES
 from maglev_hw_bridge.stage import BridgeStage, Mode
+from maglev_model.inverse import CurrentLimits, exact_currents
+from maglev_model.machine import machine_constants
 from maglev_model.parameters import build
+from maglev_study.references import References, ellipse_at
 
 SOFT = 0.05  # [m/s]
 HEIGHTS = (0.019, 0.020, 0.0225, 0.025, 0.0275, 0.0285, 0.030)  # air gap [m]
+LIMITS = CurrentLimits(7.0, 1.0, 0.0)
 _JUMP = 100  # counts
-OMEGA = 1.5 * math.pi  # of the ellipse [rad/s]
+THETA = 0.010  # amplitude of the ellipse in 4DOF [rad]
 
 
-Motion = tuple[np.ndarray, np.ndarray, np.ndarray]
-"""Position, velocity and acceleration of y, x, z, phi, theta, shape (5,) each."""
-
-
-def ellipse(phase: float) -> Motion:
-    """The motion on the ellipse at a phase [rad]."""
-    amplitude = np.array([0.005, 0.03, 0.03, 0.0, 0.01])
-    angle = phase + np.array([-0.5 * math.pi, -0.5 * math.pi, 0.0, 0.0, 0.0])
-    position = amplitude * np.sin(angle) + np.array([0.025, 0.0, 0.0, 0.0, 0.0])
-    return position, amplitude * OMEGA * np.cos(angle), -amplitude * OMEGA**2 * np.sin(angle)
-
-
-def airborne(motion: Motion) -> tuple[BridgeStage, EmulatedDriver]:
+def airborne(motion: References) -> tuple[BridgeStage, EmulatedDriver]:
     """A bridge whose platen is in that motion."""
     position, velocity, acceleration = motion
     home = {'homing.at_start': True, 'homing.x': 0.0, 'homing.z': 0.0}
-    stage = open_stage(build(BridgeParameters, home))
+    stage = BridgeStage.ready(build(BridgeParameters, home))
     driver = stage.driver
     assert isinstance(driver, EmulatedDriver)
     stage.deactivate()
     driver.boards.rig.place(position, velocity)
     stage.activate()
-    i_d, i_q = np.zeros(4), np.zeros(4)
+    machine = machine_constants(stage.parameters.machine)
     for _ in range(8):
         stage.read()
-        watched = stage.guard.arrays
-        currents(watched.machine, watched.position, acceleration, 7.0, i_d, i_q)
-        stage.write(i_d, i_q)
+        position = stage.guard.arrays.position
+        i_d, i_q, _ = exact_currents(machine, position[None], acceleration[None], LIMITS)
+        stage.write(i_d[0], i_q[0])
     stage.read()
     driver.boards.rig.forget_impact()
     return stage, driver
 
 
-def landed(motion: Motion, jumping: int | None = None) -> float:
+def landed(motion: References, jumping: int | None = None) -> float:
     """Speed at the stop when the bridge lands because it must, or an encoder (0..5) jumps [m/s]."""
     stage, driver = airborne(motion)
     if jumping is None:
@@ -80,7 +71,7 @@ def landed(motion: Motion, jumping: int | None = None) -> float:
     return driver.boards.rig.impact
 
 
-def cut(motion: Motion) -> tuple[float, float, str]:
+def cut(motion: References) -> tuple[float, float, str]:
     """Speed at the stop when the current is cut: as it is, as foretold [m/s]; which stop."""
     stage, driver = airborne(motion)
     watched = stage.guard.arrays
@@ -94,12 +85,15 @@ def cut(motion: Motion) -> tuple[float, float, str]:
 def main() -> int:
     """Print the table; tell by the exit code whether every landing was soft."""
     still = np.zeros(5)
-    places: list[tuple[str, Motion]] = [
-        (f'at rest, y = {y * 1e3:.1f} mm', (np.array([y, 0.0, 0.0, 0.0, 0.0]), still, still))
+    places: list[tuple[str, References]] = [
+        (
+            f'at rest, y = {y * 1e3:.1f} mm',
+            References(np.array([y, 0.0, 0.0, 0.0, 0.0]), still, still),
+        )
         for y in HEIGHTS
     ]
     for degrees in range(0, 360, 45):
-        places.append((f'on the ellipse, {degrees} deg', ellipse(math.radians(degrees))))
+        places.append((f'on the ellipse, {degrees} deg', ellipse_at(math.radians(degrees), THETA)))
     worst = 0.0
     print(f'{"m/s at the stop":26}{"landed":>8}{"cut":>8}{"foretold":>10}  stop')
     for name, motion in places:
@@ -108,7 +102,10 @@ def main() -> int:
         worst = max(worst, soft)
         print(f'{name:26}{soft:8.3f}{hard:8.2f}{foretold:10.2f}  {stop}')
     for encoder, name in enumerate(ENCODER_NAMES):
-        soft = max(landed(ellipse(math.radians(degrees)), encoder) for degrees in range(0, 360, 45))
+        soft = max(
+            landed(ellipse_at(math.radians(degrees), THETA), encoder)
+            for degrees in range(0, 360, 45)
+        )
         worst = max(worst, soft)
         print(f'{f"on the ellipse, {name} jumps":26}{soft:8.3f}')
     print(f'landed: {worst:.3f} m/s at most, limit {SOFT:g} m/s')

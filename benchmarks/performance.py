@@ -16,24 +16,20 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import MeasurementFault, Regulator
+from maglev_model.axes import AXES, FloatArray
 from maglev_model.motor import force_coefficients
-from maglev_model.parameters import build, read_yaml
+from maglev_model.parameters import build, from_yaml, read_yaml, replace
 from maglev_plant.arrays import true_machine
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
-from maglev_study.closed_loop import References, Run, run
-
-FloatArray = NDArray[np.float64]
+from maglev_study.closed_loop import Run, run
+from maglev_study.references import HOVER, References, ellipse, held, joined, shaped
 
 PARAMS = Path(__file__).parents[1] / 'params'
 PERIOD = 1e-3
-OMEGA = 1.5 * math.pi
-HOVER = np.array([0.025, 0.0, 0.0, 0.0, 0.0])
-AXES = ('y', 'x', 'z', 'phi', 'theta')
 COUNT = np.array([10e-6, 10e-6, 10e-6, 20e-6, 20e-6])
 """The encoders' resolution [m, rad]."""
 ELLIPSE_LIMIT = np.array([4e-6, 4e-6, 4e-6, 5e-6, 12e-6])
@@ -80,10 +76,7 @@ class Row(NamedTuple):
 
 def regulator(overlays: Sequence[Path] = (), **overrides: object) -> Regulator:
     """The default regulator, or with parameter files and single parameters over it."""
-    found: dict[str, object] = {}
-    for path in overlays:
-        found.update(read_yaml(path, 'controller'))
-    return Regulator(build(ControllerParameters, {**found, **overrides}))
+    return Regulator(replace(from_yaml(ControllerParameters, 'controller', *overlays), overrides))
 
 
 def stage(position: FloatArray, plant: Mapping[str, object]) -> SimulatedStage:
@@ -91,40 +84,6 @@ def stage(position: FloatArray, plant: Mapping[str, object]) -> SimulatedStage:
     found = {**read_yaml(PARAMS / 'benchmark.yaml', 'plant'), **plant}
     found['initial.position'] = tuple(position)
     return SimulatedStage(build(PlantParameters, found))
-
-
-def held(position: FloatArray, duration: float) -> References:
-    """A set-point (5,) held for ``duration`` [s]."""
-    n = round(duration / PERIOD)
-    return References(np.tile(position, (n, 1)), np.zeros((n, 5)), np.zeros((n, 5)))
-
-
-def shaped(start: FloatArray, end: FloatArray, time: float, hold: float) -> References:
-    """Minimum jerk from one set-point to another in ``time``, then held for ``hold`` [s]."""
-    s = np.minimum(PERIOD * np.arange(round((time + hold) / PERIOD)) / time, 1.0)[:, None]
-    way = end - start
-    return References(
-        start + way * (10 * s**3 - 15 * s**4 + 6 * s**5),
-        way / time * (30 * s**2 - 60 * s**3 + 30 * s**4),
-        way / time**2 * (60 * s - 180 * s**2 + 120 * s**3),
-    )
-
-
-def ellipse(duration: float, theta: float) -> References:
-    """The paper's sinusoids, 3DOF with ``theta`` 0, 4DOF with 0.01 rad."""
-    amplitude = np.array([0.005, 0.03, 0.03, 0.0, theta])
-    angle = OMEGA * PERIOD * np.arange(round(duration / PERIOD))[:, None]
-    angle = angle + np.array([-math.pi / 2, -math.pi / 2, 0.0, 0.0, 0.0])
-    return References(
-        HOVER + amplitude * np.sin(angle),
-        amplitude * OMEGA * np.cos(angle),
-        -amplitude * OMEGA**2 * np.sin(angle),
-    )
-
-
-def joined(*parts: References) -> References:
-    """References one after another."""
-    return References(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
 
 def fly(reg: Regulator, condition: Condition, references: References) -> Run:
@@ -153,8 +112,8 @@ def step(
     start, end = (_position(part) for part in STEPS[name])
     peak = 10.0 / math.sqrt(3.0) * np.abs(end - start) / ACCELERATION  # times duration squared
     time = max(SHAPING, math.sqrt(float(np.max(peak))))
-    way = held(end, time + hold) if raw else shaped(start, end, time, hold)
-    outcome = fly(reg, condition, joined(held(start, 2.0), way))
+    way = held(end, time + hold, PERIOD) if raw else shaped(start, end, time, hold, PERIOD)
+    outcome = fly(reg, condition, joined(held(start, 2.0, PERIOD), way))
     output = outcome.output[2000:]
     moving = start != end
     distance = (end - start)[moving]
@@ -178,7 +137,7 @@ def standstill(reg: Regulator, condition: Condition, places: int = 12) -> Row:
     worst = np.zeros(5)
     for _ in range(places):
         goal = HOVER + span * rng.uniform(-1.0, 1.0, 5)
-        outcome = fly(reg, condition, shaped(HOVER, goal, 1.0, 15.0))
+        outcome = fly(reg, condition, shaped(HOVER, goal, 1.0, 15.0, PERIOD))
         worst = np.maximum(worst, np.abs(outcome.output - goal)[-10_000:].max(axis=0))
     share = float(np.max(worst / COUNT))
     return Row('standstill', _micro(worst), share)
@@ -248,7 +207,7 @@ def _micro(error: FloatArray) -> str:
 def rows_of(reg: Regulator, condition: Condition, seconds: float = 60.0) -> Iterator[Row]:
     """Ellipses and steps in one condition."""
     for theta, name in ((0.0, 'ellipse 3DOF'), (0.010, 'ellipse 4DOF')):
-        found = mean_error(reg, condition, ellipse(seconds + 8.0, theta), seconds)
+        found = mean_error(reg, condition, ellipse(seconds + 8.0, theta, PERIOD), seconds)
         yield found._replace(name=name)
     for name in STEPS:
         yield step(reg, condition, name)
@@ -270,10 +229,10 @@ def table(reg: Regulator, quick: bool = False) -> Iterator[Row | str]:
     yield 'disturbances (mean error while they act), standing and on the 4DOF ellipse'
     for where, plant in disturbances():
         condition = Condition(where, plant)
-        yield disturbed(reg, condition, held(HOVER, 20.0), where)
+        yield disturbed(reg, condition, held(HOVER, 20.0, PERIOD), where)
     for where, plant in disturbances():
         if 'all' in where:
-            found = disturbed(reg, Condition(where, plant), ellipse(20.0, 0.010), where)
+            found = disturbed(reg, Condition(where, plant), ellipse(20.0, 0.010, PERIOD), where)
             yield found._replace(name=f'{where}, ellipse')
     yield 'model and plant apart (within 2 times): worst row of ellipses and steps'
     for condition in mismatches(4 if quick else 16):

@@ -23,10 +23,11 @@ install_hint() {
 }
 
 # Sets branch (wheels or native), and for native ros_setup, the setup.bash of the ROS 2 Jazzy to
-# use, and ros_prefix, where it lies.
+# use, and ros_prefix, where it lies. A ROS from wheels, of this or another clone, is not one to
+# build on: it counts as none.
 choose_branch() {
   branch=native ros_prefix='' ros_setup=''
-  local entry entries
+  local entry entries from_wheels=''
   if [[ -n ${ROS_DISTRO:-} && $ROS_DISTRO != jazzy ]]; then
     fail "ROS $ROS_DISTRO is sourced in this shell and this workspace is for ROS 2 Jazzy:" \
       'open a shell without it, or one with "source /opt/ros/jazzy/setup.bash"'
@@ -34,16 +35,19 @@ choose_branch() {
   if [[ -n ${ROS_DISTRO:-} ]]; then
     IFS=: read -ra entries <<<"${AMENT_PREFIX_PATH:-}"
     for entry in "${entries[@]}"; do
-      if [[ -f $entry/share/rclpy/package.xml ]]; then
+      if [[ -f $entry/.made-by-setup ]]; then
+        from_wheels=yes
+      elif [[ -f $entry/share/rclpy/package.xml ]]; then
         ros_prefix=$entry
         break
       fi
     done
-    [[ -n $ros_prefix ]] || fail 'ROS 2 Jazzy is sourced in this shell but has no rclpy:' \
-      'sudo apt install ros-jazzy-ros-base'
-  elif [[ -f /opt/ros/jazzy/setup.bash ]]; then
+    [[ -n $ros_prefix$from_wheels ]] || fail 'ROS 2 Jazzy is sourced in this shell but has no' \
+      'rclpy: sudo apt install ros-jazzy-ros-base'
+  fi
+  if [[ -z $ros_prefix && -f /opt/ros/jazzy/setup.bash ]]; then
     ros_prefix=/opt/ros/jazzy
-  else
+  elif [[ -z $ros_prefix ]]; then
     branch=wheels
     return
   fi

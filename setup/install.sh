@@ -34,7 +34,7 @@ find_keys() {
   sums=$(find src -regex 'src/maglev_\(model\|plant\|controller\|hw_bridge\|study\)/.*\.py' \
     ! -name node.py -print0 | sort -z | xargs -0r sha256sum | sha256sum)
   sources=${sums:0:16}
-  sums=$(sha256sum setup/requirements-test.txt)
+  sums=$(sha256sum setup/requirements-test{,-nodeps}.txt | sha256sum)
   test_key="$environment_key ${sums%% *}"
   shopt -u nullglob
 }
@@ -120,8 +120,7 @@ compile() {
 
 make_test_tools() {
   rm -rf -- "$cache/test-tools" "$cache/test-tools.new"
-  step 'installing the test tools' pip_install -r "$root/setup/requirements-test.txt" \
-    --target "$cache/test-tools.new"
+  step 'installing the test tools' install_test_tools "$cache/test-tools.new"
   stamp "$cache/test-tools.new/.stamp" "$test_key"
   mv -- "$cache/test-tools.new" "$cache/test-tools"
 }

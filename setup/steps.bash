@@ -87,6 +87,11 @@ pip_install() {
     --retries 2 "$@"
 }
 
+install_test_tools() { # FOLDER
+  pip_install -r "$root/setup/requirements-test.txt" --target "$1"
+  pip_install -r "$root/setup/requirements-test-nodeps.txt" --no-deps --target "$1"
+}
+
 # The message modules of an installed ROS are compiled against the NumPy it came with: pin that one.
 keep_numpy() {
   PYTHONNOUSERSITE=1 bash -c "${ros_setup:+. $ros_setup >/dev/null; } exec \"\$@\"" - \
@@ -114,7 +119,7 @@ underlay() {
   libraries=$(printf ':%s' "$venv/lib" "$venv"/lib/python3*/site-packages/ros_*.libs)
   printf 'export %s=%q\n' AMENT_PREFIX_PATH "$venv" CMAKE_PREFIX_PATH "$venv" \
     LD_LIBRARY_PATH "${libraries#:}" _ROS_WHEELS_BOOTSTRAP_COMPLETE 1 \
-    RMW_IMPLEMENTATION rmw_fastrtps_cpp
+    RMW_IMPLEMENTATION rmw_fastrtps_cpp ROS_DISTRO jazzy ROS_VERSION 2 ROS_PYTHON_VERSION 3
 }
 
 # Run COMMAND in the underlay and nothing else of the caller's environment but what a build may
@@ -174,6 +179,10 @@ END
       done
     setting PYTHONNOUSERSITE 1
     printf 'export NUMBA_CACHE_DIR=%q"/$(<%q)"\n' "$cache/numba" "$cache/numba/current"
+    echo 'if [ "${MAGLEV_SETUP:-}" = test ]; then'
+    first PATH "$cache/test-tools/bin"
+    first PYTHONPATH "$cache/test-tools"
+    echo 'fi'
     default ROS_AUTOMATIC_DISCOVERY_RANGE LOCALHOST
     default OPENBLAS_NUM_THREADS 1
     default OMP_NUM_THREADS 1
@@ -219,11 +228,15 @@ in_environment() {
 # Fill the caches of compiled functions and modules, so that the first run starts as quickly as the
 # second. Only that depends on it, so a defect of the code is left for a run or the tests to show.
 warm_up() {
-  in_environment python -c 'import maglev_hw_bridge.node, maglev_hw_bridge.opening as bridge
-bridge.warm_up()' &
+  in_environment python -c 'import maglev_hw_bridge.node as bridge
+from maglev_model.parameters import build
+stage = bridge.BridgeStage.ready(build(bridge.BridgeParameters, {"homing.at_start": True}))
+stage.read()
+stage.hold()
+stage.close()' &
   in_environment python -c 'import maglev_study.closed_loop as loop
 import maglev_controller.node, maglev_plant.node, maglev_reference.node
-import maglev_monitor.bag.analyze, maglev_monitor.live.node, maglev_monitor.bag.recorder, maglev_monitor.report.report
+import maglev_monitor.bag.recorder, maglev_monitor.live.node, maglev_monitor.report.run_report
 loop.warm_up()' || echo 'not compiled'
   wait $! || echo 'not compiled'
 }

@@ -13,9 +13,10 @@ from maglev_controller.regulator import Regulator
 from maglev_model.parameters import ParameterError, build, read_yaml, replace
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
-from maglev_study.closed_loop import References, run
+from maglev_study.closed_loop import run
+from maglev_study.references import References
 
-PARAMS = Path(__file__).parents[2] / 'params'
+PARAMS = Path(__file__).resolve().parents[2] / 'params'
 PERIOD, OMEGA = 1e-3, 1.5 * math.pi
 HOVER = np.array([0.025, 0.0, 0.0, 0.0, 0.0])
 

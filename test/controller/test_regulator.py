@@ -18,7 +18,7 @@ from maglev_model.machine import MachineParameters, machine_constants
 from maglev_model.motor import L_h
 from maglev_model.parameters import build, from_yaml, read_yaml, specs
 
-PARAMS = Path(__file__).parents[2] / 'params'
+PARAMS = Path(__file__).resolve().parents[2] / 'params'
 HOVER = np.array([0.025, 0.0, 0.0, 0.0, 0.0])
 ZERO = np.zeros(5)
 UNIT_Y = np.eye(5)[0]

@@ -25,7 +25,7 @@ OTHER_MACHINE = {
     'emulation.offset.K_h': 0.95,
     'emulation.wiring.encoder_start': [100, -5000, 7, 2**31 - 5, 0, 3],
 }
-PARAMS = Path(__file__).parents[2] / 'params' / 'hw_bridge.yaml'
+PARAMS = Path(__file__).resolve().parents[2] / 'params' / 'hw_bridge.yaml'
 
 
 def flipped(values: Sequence[int], index: int) -> list[int]:

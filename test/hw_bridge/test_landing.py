@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from bridge_flight import OMEGA, Flight, ellipse, hover
 
-from maglev_hw_bridge.landing import currents, impact_of_cut
+from maglev_hw_bridge.landing import impact_of_cut
 from maglev_hw_bridge.stage import Mode
+from maglev_model.inverse import CurrentLimits, exact_currents
+from maglev_model.machine import machine_constants
 
 SOFT = 0.05  # [m/s]
 HEIGHTS = [0.0185, 0.020, 0.0225, 0.025, 0.0285, 0.030, 0.0308]
@@ -68,13 +70,14 @@ def test_the_single_motor_machine_lands_softly() -> None:
     single = {'machine.motors': 1, 'machine.mass_y': 1.725, 'machine.mass_x': 5.3}
     locked = {'emulation.guide.locked': [False, False, True, True, True]}
     flight = Flight(hover(0.022, 0.01), {**single, **locked})
-    i_d, i_q = np.zeros(4), np.zeros(4)
+    machine = machine_constants(flight.stage.parameters.machine)
+    limits = CurrentLimits(7.0, 1.0, 0.0)
     for _ in range(8):
         flight.stage.read()
-        watched = flight.stage.guard.arrays
-        currents(watched.machine, watched.position, np.zeros(5), 7.0, i_d, i_q)
-        assert not np.any(i_d[[0, 2, 3]])
-        flight.stage.write(i_d, i_q)
+        position = flight.stage.guard.arrays.position
+        i_d, i_q, _ = exact_currents(machine, position[None], np.zeros((1, 5)), limits)
+        assert not np.any(i_d[0, [0, 2, 3]])
+        flight.stage.write(i_d[0], i_q[0])
     flight.rig.forget_impact()
     flight.stage.land('test')
     flight.until_no_current()

@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 
 from maglev_model.machine import MachineParameters, machine_constants
 from maglev_model.motor import L_h, L_v1, L_v2, L_v3, horizontal_force, vertical_force
-from maglev_model.platen import accelerations, affine_terms, gaps_from_outputs, outputs_from_gaps
+from maglev_model.platen import (
+    accelerations,
+    affine_terms,
+    gaps_from_outputs,
+    motor_gaps,
+    outputs_from_gaps,
+    outputs_of_gaps,
+)
 
 M = machine_constants(MachineParameters())
 OUTPUTS = st.tuples(
@@ -134,3 +141,18 @@ def test_gaps_that_contradict_each_other() -> None:
     outputs_from_gaps(M, np.array([0.0, 0.025, 1.0, 0.025]), 0.0, 0.0, back)
     assert math.isnan(back[3])
     assert back[4] == 0.0
+
+
+@settings(max_examples=50, deadline=None)
+@given(output=OUTPUTS)
+def test_the_geometry_of_arrays_is_the_same(output: tuple[float, ...]) -> None:
+    position = np.array([output, output])
+    gap = motor_gaps(position, M.r)
+    assert gap[1] == pytest.approx(_gaps(output[0], output[3], output[4]), abs=1e-15)
+    back = outputs_of_gaps(gap, position[:, 1], position[:, 2], M.r)
+    assert back == pytest.approx(position, abs=1e-14)
+
+
+@pytest.mark.parametrize('gap', [[0.03, np.nan, 0.03, 0.03], [0.0, 0.5, 1.0, 0.5]])
+def test_readings_no_platen_gives_have_no_tilt(gap: list[float]) -> None:
+    assert not np.isfinite(outputs_of_gaps(np.array(gap), 0.0, 0.0, M.r)[3:]).all()

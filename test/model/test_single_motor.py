@@ -15,16 +15,17 @@ from maglev_controller.regulator import Regulator
 from maglev_model.inverse import CurrentLimits, exact_inverse
 from maglev_model.machine import MachineParameters, machine_constants
 from maglev_model.motor import horizontal_force, vertical_force
-from maglev_model.parameters import ParameterError, build, from_yaml, read_yaml
+from maglev_model.parameters import ParameterError, build, from_yaml, replace
 from maglev_model.phases import Phase
 from maglev_model.platen import accelerations
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.timeline import Timeline
-from maglev_study.closed_loop import References, run
+from maglev_study.closed_loop import run
+from maglev_study.references import References
 
-PARAMS = Path(__file__).parents[2] / 'params'
+PARAMS = Path(__file__).resolve().parents[2] / 'params'
 SINGLE = MachineParameters(motors=1, mass_y=1.725, mass_x=5.3)
 MACHINE = machine_constants(SINGLE)
 BOTH = np.array([1.0, 1.0, 0.0, 0.0, 0.0])
@@ -98,17 +99,17 @@ def test_a_single_motor_needs_its_guides_locked() -> None:
 @pytest.mark.parametrize('scenario', ['steps', 'sinusoids'])
 def test_its_scenario_flies(scenario: str) -> None:
     """From the stop through the shortened scenario: at the encoders' resolution, one motor only."""
-    overrides = read_yaml(PARAMS / f'scenario_single_motor_{scenario}.yaml', 'reference')
-    overrides.update({'duration': 1.0 if scenario == 'steps' else 4.0, 'steps.settle': 1.0})
-    timeline = Timeline(build(ReferenceParameters, overrides))
+    single = PARAMS / 'single_motor.yaml'
+    reference = from_yaml(
+        ReferenceParameters, 'reference', single, PARAMS / f'scenario_single_motor_{scenario}.yaml'
+    )
+    short = {'duration': 1.0 if scenario == 'steps' else 4.0, 'steps.settle': 1.0}
+    timeline = Timeline(replace(reference, short))
     assert timeline.end is not None
     block = timeline.block(0, timeline.end)
-    stage = SimulatedStage(
-        from_yaml(PlantParameters, 'plant', PARAMS / 'benchmark.yaml', PARAMS / 'single_motor.yaml')
-    )
-    controller = read_yaml(PARAMS / 'single_motor.yaml', 'controller')
-    regulator = Regulator(build(ControllerParameters, controller))
-    assert stage.parameters.machine == regulator.parameters.machine
+    stage = SimulatedStage(from_yaml(PlantParameters, 'plant', PARAMS / 'benchmark.yaml', single))
+    regulator = Regulator(from_yaml(ControllerParameters, 'controller', single))
+    assert stage.parameters.machine == regulator.parameters.machine == reference.machine
     outcome = run(regulator, stage, References(block.position, block.velocity, block.acceleration))
     assert not outcome.direct_current[:, [0, 2, 3]].any()
     error = 1e6 * np.abs(outcome.output - block.position)

@@ -15,8 +15,11 @@ from maglev_plant.parameters import PlantParameters
 PARAMS = Path(__file__).resolve().parents[2] / 'params'
 
 
-def test_the_file_lists_every_parameter_with_its_default() -> None:
-    listed = read_yaml(PARAMS / 'plant.yaml', 'plant')
+def test_the_files_list_every_parameter_with_its_default() -> None:
+    listed = {
+        **read_yaml(PARAMS / 'machine.yaml', 'plant'),
+        **read_yaml(PARAMS / 'plant.yaml', 'plant'),
+    }
     defaults = values(PlantParameters())
     missing = set(defaults) - set(listed)
     assert not missing
@@ -26,7 +29,7 @@ def test_the_file_lists_every_parameter_with_its_default() -> None:
 
 def test_the_files_write_doubles_as_ros_wants_them() -> None:
     table = specs(PlantParameters)
-    for path in ('plant.yaml', 'benchmark.yaml', 'ideal.yaml'):
+    for path in ('machine.yaml', 'plant.yaml', 'benchmark.yaml', 'ideal.yaml'):
         listed = read_yaml(PARAMS / path, 'plant')
         for name in set(listed) & set(table):
             value = listed[name]

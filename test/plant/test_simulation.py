@@ -175,9 +175,9 @@ def test_bad_currents_are_refused_and_the_last_good_ones_held(
 
 def test_written_arrays_may_be_reused() -> None:
     stage = _stage()
-    mine = np.full(4, 0.1)
-    stage.write(mine, mine)
-    mine[:] = 9.0
+    written = np.full(4, 0.1)
+    stage.write(written, written)
+    written[:] = 9.0
     stage.read()
     stage.read()
     assert list(stage.direct_current) == [0.1] * 4
@@ -272,7 +272,7 @@ def test_offsets_scale_the_forces_felt() -> None:
     assert places[2] / places[0] == pytest.approx([0.8, 1.0], rel=1e-9)
 
 
-def test_two_runs_and_a_reset_are_bit_identical() -> None:
+def test_two_runs_are_bit_identical_also_when_configured_anew() -> None:
     noisy = build(PlantParameters, {'encoder.gap_noise': 3e-6, 'seed': 5})
 
     def law(sample: EncoderSample) -> tuple[FloatArray, FloatArray]:
@@ -290,7 +290,7 @@ def test_two_runs_and_a_reset_are_bit_identical() -> None:
             assert np.array_equal(sample.gap, first.measured[k, :4])
             assert np.array_equal(stage.state, first.state[k])
             stage.write(*law(sample))
-        stage.reset()
+        stage.configure()
         assert not stage.direct_current.any()
 
 
@@ -298,8 +298,8 @@ def test_compiled_loops_do_what_read_and_write_do() -> None:
     arrays = _stage().arrays
     arrays.command[:] = [-0.3] * 4 + [0.1] * 4
     for _ in range(30):
-        advance(arrays.scalars, arrays.axes, arrays.memory, arrays.command)
-    encode(arrays.scalars, arrays.memory, arrays.reading)
+        advance(arrays.block)
+    encode(arrays.block)
     stage = _stage()
     stage.write([-0.3] * 4, [0.1] * 4)
     for _ in range(31):
@@ -316,3 +316,31 @@ def test_closing_takes_the_currents_away() -> None:
     stage.read()
     assert not stage.direct_current.any()
     assert not stage.quadrature_current.any()
+
+
+def test_the_watchdog_counts_stage_time_since_fresh_currents() -> None:
+    stage = _stage(watchdog=0.05)
+    stage.write([0.1] * 4, ZERO)
+    for _ in range(50):
+        stage.hold()
+    assert stage.fault is None
+    stage.write([0.1] * 4, ZERO)  # fresh, though nothing has changed
+    for _ in range(50):
+        stage.hold()
+    assert stage.flying
+    assert stage.fault is None
+    stage.hold()
+    assert stage.fault is not None
+    assert stage.fault.reason == 'no fresh currents for 51 ms'
+    assert not stage.flying
+    stage.write([0.1] * 4, ZERO)
+    assert not stage.flying
+
+
+def test_configured_anew_it_has_no_fault() -> None:
+    stage = _stage()
+    stage.stop()
+    stage.configure()
+    assert stage.fault is None
+    stage.write([0.1] * 4, ZERO)
+    assert stage.flying

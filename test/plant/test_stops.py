@@ -14,7 +14,7 @@ from scipy.integrate import quad
 from maglev_model.machine import machine_constants
 from maglev_model.motor import force_coefficients
 from maglev_model.parameters import build, read_yaml
-from maglev_plant.arrays import MEMORY, stage_arrays
+from maglev_plant.arrays import stage_arrays
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
 from maglev_plant.stops import apply_stops
@@ -161,12 +161,13 @@ def test_contact_goes_to_the_nearest_point_of_the_allowed_set(
     start, step = np.zeros(10), 1e-3
     start[0] = edge
     phi, theta = float(np.clip(phi, -0.003, 0.003)), float(np.clip(theta, -0.014, 0.014))
-    memory = np.zeros(MEMORY)
     wanted = np.array([edge + sign * depth, phi, theta])
-    memory[[0, 6, 8]] = wanted
-    memory[[1, 7, 9]] = (wanted - start[[0, 6, 8]]) / step
-    apply_stops(arrays.scalars, arrays.axes, memory, start, step)
-    got = memory[[0, 6, 8]]
+    state = arrays.state
+    state[:] = 0.0
+    state[[0, 6, 8]] = wanted
+    state[[1, 7, 9]] = (wanted - start[[0, 6, 8]]) / step
+    apply_stops(arrays.block[0], start)
+    got = state[[0, 6, 8]]
     assert sign * (got[0] - edge) + radius * np.max(np.abs(got[1:])) <= 1e-12
     weight = np.array([6.9, 0.5268, 0.5268])
     rng = np.random.default_rng(seed)
@@ -177,7 +178,7 @@ def test_contact_goes_to_the_nearest_point_of_the_allowed_set(
     depths = radius * np.max(np.abs(tilts), axis=1) + spare
     allowed = np.column_stack([edge - sign * depths, tilts])
     assert np.max((allowed - got) @ (weight * (wanted - got))) < 1e-12
-    assert memory[[1, 7, 9]] == pytest.approx((got - start[[0, 6, 8]]) / step, abs=1e-12)
+    assert state[[1, 7, 9]] == pytest.approx((got - start[[0, 6, 8]]) / step, abs=1e-12)
 
 
 def test_a_tilted_landing_ends_level_and_still() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from pathlib import Path
 
@@ -11,7 +12,8 @@ import yaml
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
-from maglev_model.parameters import ParameterError, build, read_yaml
+from maglev_model.loop_parameters import AxisLoopParameters
+from maglev_model.parameters import ParameterError, build, from_yaml, read_yaml, replace
 from maglev_model.phases import Phase
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
@@ -20,9 +22,10 @@ from maglev_reference.accuracy import compliance, expected_error, harmonics, sum
 from maglev_reference.parameters import TRAJECTORIES, ReferenceParameters
 from maglev_reference.timeline import Timeline
 from maglev_reference.trajectories import course
-from maglev_study.closed_loop import References, run
+from maglev_study.closed_loop import run
+from maglev_study.references import References
 
-PARAMS = Path(__file__).parents[2] / 'params'
+PARAMS = Path(__file__).resolve().parents[2] / 'params'
 OMEGA_0 = 1.5 * math.pi
 HOVER = np.array([0.025, 0.0, 0.0, 0.0, 0.0])
 SCENARIOS = (
@@ -34,14 +37,12 @@ MATCHED = ('circle', 'helix', 'lissajous', 'waypoints', 'square')
 
 def tables(*names, **overrides):
     """Reference and controller parameters from overlays of params/."""
-    reference, controller = {}, {}
-    for name in names:
-        reference.update(read_yaml(PARAMS / f'{name}.yaml', 'reference'))
-        controller.update(read_yaml(PARAMS / f'{name}.yaml', 'controller'))
-    if reference.get('trajectory') == 'file':
-        reference['file.path'] = str(PARAMS / 'figure_of_eight.csv')
-    reference.update({name.replace('__', '.'): value for name, value in overrides.items()})
-    return build(ReferenceParameters, reference), build(ControllerParameters, controller)
+    paths = [PARAMS / f'{name}.yaml' for name in names]
+    reference = from_yaml(ReferenceParameters, 'reference', *paths)
+    changes = {name.replace('__', '.'): value for name, value in overrides.items()}
+    if reference.trajectory == 'file':
+        changes['file.path'] = str(PARAMS / 'figure_of_eight.csv')
+    return replace(reference, changes), from_yaml(ControllerParameters, 'controller', *paths)
 
 
 def tracked(reference, controller):
@@ -106,11 +107,24 @@ def test_the_matching_overlays_are_what_the_tool_gives(name, capsys):
     text = capsys.readouterr().out
     given = yaml.safe_load((PARAMS / f'matched_{name}.yaml').read_text(encoding='utf-8'))
     found = yaml.safe_load(text)
-    for node in ('controller', 'reference'):
-        values, wanted = (content[node]['ros__parameters'] for content in (found, given))
-        frequency = values['internal_model'].pop('fundamental')
-        assert frequency == pytest.approx(wanted['internal_model'].pop('fundamental'), rel=1e-12)
-        assert values == wanted
+    values, wanted = (content['/**']['ros__parameters'] for content in (found, given))
+    frequency = values['internal_model'].pop('fundamental')
+    assert frequency == pytest.approx(wanted['internal_model'].pop('fundamental'), rel=1e-12)
+    assert values == wanted
+    assert set(found) == set(given) == {'/**'}
+
+
+def test_each_axis_has_its_own_loop():
+    reference, _ = tables('scenario_circle')
+    quick, _ = tables('scenario_circle', x__learning=30.0)
+    wide, _ = tables('scenario_circle', x__bandwidth=400.0)
+    expected, better, best = (
+        expected_error(course(table), table) for table in (reference, quick, wide)
+    )
+    assert better[1] < 0.9 * expected[1]
+    assert best[1] < 0.3 * expected[1]
+    for other in (better, best):
+        assert np.delete(other, 1).tolist() == np.delete(expected, 1).tolist()
 
 
 def test_what_is_matched_keeps_within_count_and_total():
@@ -147,28 +161,27 @@ def test_the_compliance_is_the_closed_loops(frequency):
         Regulator(ControllerParameters()), SimulatedStage(build(PlantParameters, plant)), still
     )
     error = outcome.output[-6000:, 1]
-    table = ReferenceParameters().internal_model
-    wanted = compliance(np.array([frequency]), table.frequencies()[1], table)
+    table = ReferenceParameters()
+    held, sampling = table.held_frequencies[1], table.internal_model.sampling
+    wanted = compliance(np.array([frequency]), held, table.x, sampling)
     found = math.sqrt(2.0) * error.std() / (force / mass)
     assert found == pytest.approx(wanted[0], rel=0.25)
 
 
 def test_a_held_frequency_leaves_nothing_and_a_constant_neither():
-    table = ReferenceParameters().internal_model
-    found = compliance(np.array([0.0, OMEGA_0, 3.0]), (0.0, OMEGA_0), table)
+    table = ReferenceParameters().x
+    found = compliance(np.array([0.0, OMEGA_0, 3.0]), (0.0, OMEGA_0), table, 2.05)
     assert found[:2].tolist() == [0.0, 0.0]
     assert 1e-6 < found[2] < 1.0 / table.bandwidth**2
 
 
 def test_the_internal_model_is_the_controllers():
-    table, controller = ReferenceParameters().internal_model, ControllerParameters()
-    assert table.fundamental == controller.internal_model.fundamental
-    for axis, own in zip(('y', 'x', 'z', 'phi', 'theta'), controller.axes, strict=True):
-        assert getattr(table, axis) == own.multiples
+    reference, controller = ReferenceParameters(), ControllerParameters()
+    assert reference.internal_model.fundamental == controller.internal_model.fundamental
+    for table, own in zip(reference.loops, controller.axes, strict=True):
         assert own.design == 'bandwidth'
-        assert own.bandwidth == table.bandwidth
-        assert own.integration == table.integration
-        assert own.learning == table.learning
+        for field in dataclasses.fields(AxisLoopParameters):
+            assert getattr(own, field.name) == getattr(table, field.name)
 
 
 def test_the_ellipse_is_held():

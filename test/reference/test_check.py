@@ -7,12 +7,12 @@ import pytest
 
 from maglev_model.parameters import ParameterError, build
 from maglev_reference.check import UnreachableError, check_rest, check_samples, utilisation, within
-from maglev_reference.parameters import Limits, ReferenceParameters
-from maglev_reference.profiles import Kinematics
+from maglev_reference.motion import Kinematics
+from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.timeline import Timeline
 
 HOME = np.array([0.025, 0.0, 0.0, 0.0, 0.0])
-LIMITS = Limits()
+PARAMETERS = ReferenceParameters()
 
 
 def still(count=10):
@@ -26,8 +26,8 @@ def refused(overrides):
 
 
 def test_standing_at_home_passes():
-    check_samples(still(), 0.0, 1e-3, LIMITS)
-    assert within(utilisation(still(), LIMITS))
+    check_samples(still(), 0.0, PARAMETERS)
+    assert within(utilisation(still(), PARAMETERS))
 
 
 @pytest.mark.parametrize(
@@ -46,10 +46,10 @@ def test_offence_is_named_with_its_time(kind, axis, value, words):
     samples = still()
     getattr(samples, kind)[6, axis] = value
     with pytest.raises(UnreachableError) as caught:
-        check_samples(samples, 2.0, 1e-3, LIMITS)
+        check_samples(samples, 2.0, PARAMETERS)
     for word in [*words, 'at 2.006 s']:
         assert word in str(caught.value)
-    assert not within(utilisation(samples, LIMITS))
+    assert not within(utilisation(samples, PARAMETERS))
 
 
 def test_each_motor_has_its_own_gap():
@@ -57,11 +57,11 @@ def test_each_motor_has_its_own_gap():
     samples.position[:, 0] = 0.0195
     samples.position[:, 4] = 0.005  # 1.985 mm at the motors
     with pytest.raises(UnreachableError, match=r'the gap at motor 4 is 0\.017515 m'):
-        check_samples(samples, 0.0, 1e-3, LIMITS)
+        check_samples(samples, 0.0, PARAMETERS)
     samples.position[:, 4] *= -1.0
     with pytest.raises(UnreachableError, match='the gap at motor 2'):
-        check_samples(samples, 0.0, 1e-3, LIMITS)
-    assert utilisation(samples, LIMITS) > 1.0
+        check_samples(samples, 0.0, PARAMETERS)
+    assert utilisation(samples, PARAMETERS) > 1.0
 
 
 def test_a_jump_is_refused_unless_it_is_a_raw_step():
@@ -69,9 +69,9 @@ def test_a_jump_is_refused_unless_it_is_a_raw_step():
     samples.position[4:, 1] = 0.01
     jumps = np.zeros(10, dtype=bool)
     with pytest.raises(UnreachableError, match=r'x jumps by 0.01 m in one sample at 0.004 s'):
-        check_samples(samples, 0.0, 1e-3, LIMITS, jumps)
+        check_samples(samples, 0.0, PARAMETERS, jumps)
     jumps[4] = True
-    check_samples(samples, 0.0, 1e-3, LIMITS, jumps)
+    check_samples(samples, 0.0, PARAMETERS, jumps)
 
 
 @pytest.mark.parametrize('axis', ['x', 'z', 'y', 'phi', 'theta'])
@@ -138,13 +138,13 @@ def test_home_out_of_range_is_refused():
 
 
 def test_lift_off_from_elsewhere_than_the_stop_is_refused():
-    check_rest(np.array([0.0305, 0.01, -0.02, 0.0, 0.0]), 0.031, 0.001, LIMITS)
+    check_rest(np.array([0.0305, 0.01, -0.02, 0.0, 0.0]), PARAMETERS)
     with pytest.raises(UnreachableError, match=r'gap of 18.000 mm, not on its lower stop'):
-        check_rest(np.array([0.018, 0.0, 0.0, 0.0, 0.0]), 0.031, 0.001, LIMITS)
+        check_rest(np.array([0.018, 0.0, 0.0, 0.0, 0.0]), PARAMETERS)
     with pytest.raises(UnreachableError, match=r'x is 0.06 m'):
-        check_rest(np.array([0.031, 0.06, 0.0, 0.0, 0.0]), 0.031, 0.001, LIMITS)
+        check_rest(np.array([0.031, 0.06, 0.0, 0.0, 0.0]), PARAMETERS)
     with pytest.raises(UnreachableError, match='not finite'):
-        check_rest(np.array([0.031, np.nan, 0.0, 0.0, 0.0]), 0.031, 0.001, LIMITS)
+        check_rest(np.array([0.031, np.nan, 0.0, 0.0, 0.0]), PARAMETERS)
 
 
 @pytest.mark.parametrize(

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from maglev_model.parameters import ParameterError, build
+from maglev_model.quintic import minimum_jerk_time
 from maglev_reference.curves import Chirp, Helix, Sinusoids, Square
 from maglev_reference.parameters import ReferenceParameters
-from maglev_reference.profiles import minimum_jerk_time
 from maglev_reference.trajectories import course
 from maglev_reference.trajectory_parameters import (
     ChirpParameters,

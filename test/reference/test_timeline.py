@@ -10,15 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import maglev_reference
-from maglev_model.parameters import build, read_yaml, specs, to_yaml
+from maglev_model.parameters import SHARED_GROUPS, build, from_yaml, read_yaml, specs, to_yaml
 from maglev_model.phases import Phase
+from maglev_model.platen import motor_gaps
 from maglev_reference.check import UnreachableError
-from maglev_reference.geometry import motor_gaps
 from maglev_reference.node import ReferenceNodeParameters
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.timeline import Timeline
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).resolve().parents[2]
 DT = 1e-3
 OMEGA_0 = 1.5 * np.pi
 SHORT = {
@@ -279,7 +279,23 @@ def test_it_lands_out_of_a_raw_step(late):
 def test_every_parameter_is_listed_with_its_default():
     listed = read_yaml(ROOT / 'params' / 'reference.yaml', 'reference')
     assert build(ReferenceNodeParameters, listed) == ReferenceNodeParameters()
-    assert set(listed) == set(specs(ReferenceNodeParameters))
+    shared = {
+        name for name in specs(ReferenceNodeParameters) if name.split('.')[0] in SHARED_GROUPS
+    }
+    assert set(listed) == set(specs(ReferenceNodeParameters)) - shared | {'internal_model.sampling'}
+
+
+def test_the_machine_is_listed_with_its_defaults_for_all_nodes():
+    path = ROOT / 'params' / 'machine.yaml'
+    listed = read_yaml(path, 'any')
+    machine = {
+        name for name in specs(ReferenceParameters) if name.startswith(('machine.', 'guide.'))
+    }
+    assert set(listed) == machine
+    assert from_yaml(ReferenceParameters, 'reference', path) == ReferenceParameters()
+    for name, value in listed.items():
+        elements = value if isinstance(value, list) else [value]
+        assert {type(element) for element in elements} == {specs(ReferenceParameters)[name].kind}
 
 
 def test_the_package_has_no_way_to_the_plant():

@@ -119,6 +119,18 @@ def test_a_jazzy_that_lacks_packages(machine: Machine, tmp_path: Path) -> None:
 
 
 @needs_wheels
+def test_a_jazzy_from_wheels_is_none_to_build_on(machine: Machine, tmp_path: Path) -> None:
+    """As in a shell that has sourced the setup.sh of this or another clone."""
+    venv = tmp_path / 'another clone' / '.venv'
+    (venv / 'share' / 'rclpy').mkdir(parents=True)
+    (venv / 'share' / 'rclpy' / 'package.xml').touch()
+    (venv / '.made-by-setup').touch()
+    (machine.bin / 'make').unlink()
+    line = machine.refusal(ROS_DISTRO='jazzy', AMENT_PREFIX_PATH=f'/overlay:{venv}')
+    assert 'missing: make' in line
+
+
+@needs_wheels
 def test_python_is_missing(machine: Machine) -> None:
     (machine.bin / 'python3').unlink()
     assert 'no Python and this needs Python 3.10 to 3.13' in machine.refusal()
@@ -237,6 +249,7 @@ def test_once_done_it_costs_nothing_and_changes_no_shell(tmp_path: Path) -> None
         set -u -- one two
         before=$(set -o; shopt)
         . {ROOT}/setup.sh
+        [[ $ROS_DISTRO$ROS_VERSION$ROS_PYTHON_VERSION == jazzy23 ]] || echo no ROS
         path=$PATH$PYTHONPATH$LD_LIBRARY_PATH$AMENT_PREFIX_PATH
         . {ROOT}/setup.sh
         [[ $path == "$PATH$PYTHONPATH$LD_LIBRARY_PATH$AMENT_PREFIX_PATH" ]] || echo grows

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,16 +13,15 @@ from maglev_controller.design.gains import augmented
 from maglev_controller.landing import Landing
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import MeasurementFault, Regulator
+from maglev_model.axes import PHI, THETA, X, Y, Z
 from maglev_model.parameters import build, read_yaml
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
-from maglev_study.closed_loop import References, Run, run
+from maglev_study.closed_loop import Run, run
+from maglev_study.references import HOVER, References, ellipse, held, joined, shaped
 
-PARAMS = Path(__file__).parents[2] / 'params'
+PARAMS = Path(__file__).resolve().parents[2] / 'params'
 PERIOD = 1e-3
-OMEGA = 1.5 * math.pi
-Y, X, Z, PHI, THETA = range(5)
-HOVER = np.array([0.025, 0.0, 0.0, 0.0, 0.0])
 
 
 def regulator(*overlays: str, **overrides: object) -> Regulator:
@@ -41,36 +39,6 @@ def stage(overlay: str, position: np.ndarray, **overrides: object) -> SimulatedS
     found.update({name.replace('__', '.'): value for name, value in overrides.items()})
     found['initial.position'] = tuple(position)
     return SimulatedStage(build(PlantParameters, found))
-
-
-def held(position: np.ndarray, duration: float) -> References:
-    """A set-point (5,) held."""
-    n = round(duration / PERIOD)
-    return References(np.tile(position, (n, 1)), np.zeros((n, 5)), np.zeros((n, 5)))
-
-
-def shaped(start: np.ndarray, end: np.ndarray, time: float, hold: float) -> References:
-    """Minimum-jerk from one set-point to another in ``time``, then held."""
-    s = PERIOD * np.arange(round((time + hold) / PERIOD)) / time
-    s = np.minimum(s, 1.0)[:, None]
-    way = end - start
-    return References(
-        start + way * (10 * s**3 - 15 * s**4 + 6 * s**5),
-        way / time * (30 * s**2 - 60 * s**3 + 30 * s**4),
-        way / time**2 * (60 * s - 180 * s**2 + 120 * s**3),
-    )
-
-
-def ellipse(duration: float, theta: float) -> References:
-    """The paper's sinusoids, 3DOF with ``theta`` 0, 4DOF with 0.01 rad."""
-    offset, amplitude = HOVER, np.array([0.005, 0.03, 0.03, 0.0, theta])
-    angle = OMEGA * PERIOD * np.arange(round(duration / PERIOD))[:, None]
-    angle = angle + np.array([-math.pi / 2, -math.pi / 2, 0.0, 0.0, 0.0])
-    return References(
-        offset + amplitude * np.sin(angle),
-        amplitude * OMEGA * np.cos(angle),
-        -amplitude * OMEGA**2 * np.sin(angle),
-    )
 
 
 class Step(NamedTuple):
@@ -97,7 +65,7 @@ def raw_step(reg: Regulator, plant: str, axis: int, start: float, end: float, ho
     """A raw step from rest, the regulator enabled with it."""
     position, target = HOVER.copy(), HOVER.copy()
     position[axis], target[axis] = start, end
-    outcome = run(reg, stage(plant, position), held(target, hold))
+    outcome = run(reg, stage(plant, position), held(target, hold, PERIOD))
     return judge(outcome.output[:, axis], start, end, axis >= PHI)
 
 
@@ -124,9 +92,9 @@ def test_paper_step_in_flight_on_the_ideal_plant() -> None:
     low, high = np.array([0.020, 0.0, 0.0, 0.0, 0.0]), np.array([0.027, 0.0, 0.0, 0.0, 0.0])
     reg, plant = regulator('paper.yaml'), stage('ideal.yaml', HOVER)
     assert reg.parameters.internal_model.restart_at_step
-    run(reg, plant, shaped(HOVER, low, 2.0, 8.0))
+    run(reg, plant, shaped(HOVER, low, 2.0, 8.0, PERIOD))
     reg.reset()
-    step = judge(run(reg, plant, held(high, 6.0)).output[:, Y], 0.020, 0.027, False)
+    step = judge(run(reg, plant, held(high, 6.0, PERIOD)).output[:, Y], 0.020, 0.027, False)
     assert step.overshoot == pytest.approx(16.0, abs=1.0)
     assert step.settling == pytest.approx(2.0, abs=0.1)
 
@@ -147,7 +115,7 @@ def test_exact_inverse_makes_the_loop_linear() -> None:
         position, target = HOVER.copy(), HOVER.copy()
         position[Y], target[Y] = start, end
         reg.reset()
-        outcome = run(reg, stage('ideal.yaml', position), held(target, 4.0))
+        outcome = run(reg, stage('ideal.yaml', position), held(target, 4.0, PERIOD))
         distance = np.abs(outcome.output[:, Y] - end - wanted).max()
         assert distance < 0.015 * abs(end - start)
 
@@ -155,7 +123,7 @@ def test_exact_inverse_makes_the_loop_linear() -> None:
 @pytest.mark.parametrize('theta', [0.0, 0.010])
 def test_paper_errors_on_the_benchmark_plant(theta: float) -> None:
     """The errors the paper measured, over 60 s, within a tenth; the default is far below them."""
-    references = ellipse(66.0, theta)
+    references = ellipse(66.0, theta, PERIOD)
     reg = regulator('paper.yaml', 'paper_exact.yaml')
     outcome = run(reg, stage('benchmark.yaml', references.position[0]), references)
     paper = mean_error(outcome, references, 60.0)
@@ -197,10 +165,8 @@ def test_default_steps(axis: int, start: float, end: float, raw: bool) -> None:
     begin, target = HOVER.copy(), HOVER.copy()
     begin[axis], target[axis] = start, end
     way = 4.0 if raw else 0.2
-    second = held(target, 4.0) if raw else shaped(begin, target, way, 4.0)
-    references = References(
-        *(np.concatenate(p) for p in zip(held(begin, 1.0), second, strict=True))
-    )
+    second = held(target, 4.0, PERIOD) if raw else shaped(begin, target, way, 4.0, PERIOD)
+    references = joined(held(begin, 1.0, PERIOD), second)
     outcome = run(regulator(), stage('benchmark.yaml', begin), references)
     step = judge(outcome.output[1000:, axis], start, end, axis >= PHI)
     assert step.overshoot < 1.0
@@ -223,7 +189,7 @@ def test_default_steps(axis: int, start: float, end: float, raw: bool) -> None:
 )
 def test_default_on_another_plant_than_it_knows(offset: dict[str, float]) -> None:
     """10 % off in forces or masses, 30 % in springs: the ellipse's errors hardly change."""
-    references = ellipse(16.0, 0.010)
+    references = ellipse(16.0, 0.010, PERIOD)
     outcome = run(
         regulator(), stage('benchmark.yaml', references.position[0], **offset), references
     )
@@ -232,7 +198,7 @@ def test_default_on_another_plant_than_it_knows(offset: dict[str, float]) -> Non
 
 def test_a_delayed_run_is_one_whose_currents_come_a_sample_late() -> None:
     """Against the loop written out."""
-    references = ellipse(0.5, 0.010)
+    references = ellipse(0.5, 0.010, PERIOD)
     delayed = run(
         regulator(), stage('benchmark.yaml', references.position[0]), references, delayed=True
     )
@@ -248,7 +214,7 @@ def test_a_delayed_run_is_one_whose_currents_come_a_sample_late() -> None:
 def test_standstill_after_a_move_stays_within_the_encoders() -> None:
     """Friction, counts and integral action together: within a count and a half for 10 s."""
     start, goal = HOVER, np.array([0.0243, 0.0123, -0.0071, 0.0004, 0.0052])
-    references = shaped(start, goal, 1.0, 15.0)
+    references = shaped(start, goal, 1.0, 15.0, PERIOD)
     outcome = run(regulator(), stage('benchmark.yaml', start), references)
     error = np.abs(outcome.output - goal)[-10_000:].max(axis=0)
     assert np.all(error < [1e-5, 1e-5, 1e-5, 2e-5, 2e-5])
@@ -259,7 +225,7 @@ def test_lift_off_and_landing(overlays: tuple[str, ...]) -> None:
     """From the stop to 25 mm without touching the other one, and softly back by the controller."""
     floor = np.array([0.031, 0.0, 0.0, 0.0, 0.0])
     plant, reg = stage('benchmark.yaml', floor), regulator(*overlays)
-    lifted = run(reg, plant, shaped(floor, HOVER, 1.5, 4.0))
+    lifted = run(reg, plant, shaped(floor, HOVER, 1.5, 4.0, PERIOD))
     assert abs(lifted.output[-1, Y] - 0.025) < 2e-4
     assert lifted.output[:, Y].min() > 0.023
     landing = Landing(reg.parameters, HOVER, np.zeros(5), np.zeros(5))
@@ -285,7 +251,7 @@ def test_a_saturated_axis_comes_back(axis: int) -> None:
     anything = (1.0,) * 5
     for bound in ((5e-4, 5e-4, 5e-4, 1.5e-3, 1.5e-3), anything):
         reg = regulator(limits__error=bound, jumps__duration=0.0)
-        outcome = run(reg, stage('benchmark.yaml', start), held(far, 4.0))
+        outcome = run(reg, stage('benchmark.yaml', start), held(far, 4.0, PERIOD))
         error = np.abs(outcome.output[-500:] - far).max(axis=0)
         assert (error[axis] < 1e-5) == (bound != anything)
         assert np.abs(outcome.output[:, Y] - 0.025).max() < 5e-4
@@ -293,7 +259,7 @@ def test_a_saturated_axis_comes_back(axis: int) -> None:
 
 def test_two_runs_are_bit_identical_and_equal_the_stepwise_loop() -> None:
     """Also when the run is cut in two, and when the nodes' way of stepping is taken."""
-    references = ellipse(1.5, 0.010)
+    references = ellipse(1.5, 0.010, PERIOD)
     first = run(regulator(), stage('benchmark.yaml', references.position[0]), references)
     reg, plant = regulator(), stage('benchmark.yaml', references.position[0])
     parts = [
@@ -315,7 +281,7 @@ def test_two_runs_are_bit_identical_and_equal_the_stepwise_loop() -> None:
 
 def test_bad_references_are_named() -> None:
     """A wrong shape, and a sample the regulator refuses."""
-    references = held(HOVER, 0.1)
+    references = held(HOVER, 0.1, PERIOD)
     with pytest.raises(ValueError, match=r'velocity must have shape \(100, 5\), not \(99, 5\)'):
         run(
             regulator(),

@@ -14,10 +14,11 @@ import numpy as np
 import pytest
 
 from maglev_controller.regulator import Regulator
+from maglev_study.references import HOVER, ellipse, held
 
 
 def _load() -> ModuleType:
-    path = Path(__file__).parents[2] / 'benchmarks' / 'performance.py'
+    path = Path(__file__).resolve().parents[2] / 'benchmarks' / 'performance.py'
     spec = importlib.util.spec_from_file_location('performance', path)
     assert spec is not None
     assert spec.loader is not None
@@ -43,7 +44,9 @@ def _regulator() -> Regulator:
 @pytest.mark.parametrize('theta', [0.0, 0.010])
 def test_ellipses(regulator: Regulator, condition: object, theta: float) -> None:
     """At most 4 µm in y, x, z, 5 µrad in φ, 12 µrad in θ."""
-    row = performance.mean_error(regulator, condition, performance.ellipse(16.0, theta), 8.0)
+    row = performance.mean_error(
+        regulator, condition, ellipse(16.0, theta, performance.PERIOD), 8.0
+    )
     assert row.share <= 1.0, row
 
 
@@ -73,7 +76,9 @@ def test_standstill_has_no_limit_cycle(regulator: Regulator, condition: object) 
 def test_model_and_plant_apart(regulator: Regulator, name: str) -> None:
     """Every figure within twice the limits."""
     condition = MISMATCHES[name]
-    row = performance.mean_error(regulator, condition, performance.ellipse(12.0, 0.010), 6.0)
+    row = performance.mean_error(
+        regulator, condition, ellipse(12.0, 0.010, performance.PERIOD), 6.0
+    )
     assert row.share <= 1.0, row
     for step in ('y 30 to 20 mm', 'x -30 to 30 mm', 'theta -10 to 10 mrad', 'all five at once'):
         row = performance.step(regulator, condition, step, hold=4.0)
@@ -99,6 +104,6 @@ def test_what_no_current_can_hold_is_told_apart() -> None:
 def test_disturbances(regulator: Regulator, name: str, plant: dict[str, object]) -> None:
     """10 N and 5 N sinusoidal: mean error ≤ 5 µm while they act, their onset included."""
     condition = performance.Condition(name, plant)
-    still = performance.held(performance.HOVER, 10.0)
+    still = held(HOVER, 10.0, performance.PERIOD)
     row = performance.disturbed(regulator, condition, still, name)
     assert row.share <= 1.0, row

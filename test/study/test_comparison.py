@@ -9,16 +9,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from maglev_model.axes import THETA, X, Y
 from maglev_model.parameters import ParameterError
 from maglev_study.comparison import experiments, region
 from maglev_study.comparison.contestants import find_contestants
 from maglev_study.comparison.experiments import Row, StepExperiment
-from maglev_study.comparison.flight import HOVER, THETA, Flight, X, Y, judge
+from maglev_study.comparison.flight import Flight, judge
 from maglev_study.comparison.main import main
 from maglev_study.comparison.region import LOST, NOT_SETTLED, Region
 from maglev_study.comparison.table import share, table, to_json
+from maglev_study.references import HOVER
 
-PARAMS = Path(__file__).parents[2] / 'params'
+PARAMS = Path(__file__).resolve().parents[2] / 'params'
 
 
 def test_the_approaches_come_in_the_papers_order() -> None:

@@ -7,22 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from maglev_model.axes import THETA, X, Y
 from maglev_model.parameters import replace
 from maglev_study.closed_loop import run
 from maglev_study.comparison.contestants import Contestant, find_contestants
-from maglev_study.comparison.flight import (
-    HOVER,
-    THETA,
-    Flight,
-    X,
-    Y,
-    ellipse,
-    held,
-    judge,
-    shaped,
-)
+from maglev_study.comparison.flight import Flight, judge
+from maglev_study.references import HOVER, ellipse, held, shaped
 
-PARAMS = Path(__file__).parents[2] / 'params'
+PARAMS = Path(__file__).resolve().parents[2] / 'params'
 LAWS = ('jacobian_lead_lag', 'feedback_lead_lag', 'feedback_soi', 'regulator_3dof')
 FLOOR = np.array([0.031, 0.0, 0.0, 0.0, 0.0])
 
@@ -37,11 +29,11 @@ def test_every_law_lifts_off_and_follows_the_ellipse(name: str) -> None:
     """From the lower stop, and then in 4DOF, or 3DOF with the tilts locked."""
     law = contestant(name)
     flight = Flight(law)
-    flight.stage.arrays.memory[0] = FLOOR[Y]
+    flight.stage.arrays.state[0] = FLOOR[Y]
     lifted = run(flight.regulator, flight.stage, shaped(FLOOR, HOVER, 1.5, 4.0, flight.period))
     assert lifted.output[:, Y].min() > 0.0248
     assert abs(lifted.output[-1, Y] - 0.025) < 5e-5
-    references = ellipse(10.0, 0.010 if law.tilts else 0.0, flight.period)
+    references = ellipse(10.0, 0.010 if law.tilts else 0.0, flight.period, grow=2.0)
     outcome = flight.follow(references)
     assert outcome is not None
     error = 1e6 * np.abs(outcome.output - references.position)[-4000:].mean(axis=0)
@@ -129,7 +121,7 @@ def test_sample_by_sample_as_in_the_compiled_loop(name: str) -> None:
     """The node's way of stepping, bit for bit."""
     law = contestant(name)
     first = Flight(law)
-    references = ellipse(0.6, 0.010, first.period)
+    references = ellipse(0.6, 0.010, first.period, grow=2.0)
     outcome = first.follow(references)
     assert outcome is not None
     second = Flight(law)

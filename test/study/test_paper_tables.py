@@ -118,7 +118,7 @@ def test_what_is_wrong_with_a_run_is_said_and_fails(folder: Path, bag: Path, cap
     cut = folder / 'ours' / 'ellipse_4dof' / 'bag'
     cut.unlink()
     cut.mkdir()
-    (cut / 'bag.mcap').write_bytes((bag / 'bag.mcap').read_bytes()[:-2000])
+    (cut / 'bag.mcap').write_bytes((bag / 'bag_0.mcap').read_bytes()[:-2000])
     shutil.rmtree(folder / 'ours' / 'steps')
     assert paper_tables.paper_tables([str(folder)]) == NOT_PASSED
     problems = dict(

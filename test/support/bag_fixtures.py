@@ -37,7 +37,8 @@ def bag(
     writer = open_bag(path)
     values = {'run': json.dumps({'scenario': 'made_up', 'mode': 'lockstep', 'stage': 'plant'})}
     stamp = int(run.stamp[0])
-    writer.write('/diagnostics', stamp, encoder.diagnostic(stamp, 0, 'monitor', 'ok', values))
+    message = encoder.diagnostic(stamp, 0, 'monitor', 'ok', values)
+    writer.write('/diagnostics', [(message, stamp)])
     write_samples(writer, run, messages)
     writer.close()
     return path

@@ -17,6 +17,7 @@ from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.stage import BridgeStage, Mode
 from maglev_model.parameters import build
 from maglev_model.stage import StageError
+from maglev_study.references import ellipse_at
 
 HOME = {'homing.at_start': True, 'homing.x': 0.0, 'homing.z': 0.0}
 OMEGA = 1.5 * math.pi
@@ -25,14 +26,7 @@ Target = Callable[[float], tuple[np.ndarray, np.ndarray, np.ndarray]]
 
 def ellipse(time: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The paper's ellipse in 4DOF: position, velocity, acceleration, (5,) each."""
-    amplitude = np.array([0.005, 0.03, 0.03, 0.0, 0.01])
-    angle = OMEGA * time + np.array([-0.5 * math.pi, -0.5 * math.pi, 0.0, 0.0, 0.0])
-    offset = np.array([0.025, 0.0, 0.0, 0.0, 0.0])
-    return (
-        offset + amplitude * np.sin(angle),
-        amplitude * OMEGA * np.cos(angle),
-        -amplitude * OMEGA**2 * np.sin(angle),
-    )
+    return ellipse_at(OMEGA * time, 0.01)
 
 
 def hover(*position: float) -> Target:

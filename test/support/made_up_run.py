@@ -14,7 +14,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from maglev_model.phases import Phase
 from maglev_monitor.bag.writer import BagWriter
 
-MESSAGES = Path(__file__).parents[2] / 'src' / 'maglev_msgs' / 'msg'
+MESSAGES = Path(__file__).resolve().parents[2] / 'src' / 'maglev_msgs' / 'msg'
 RADIUS = 0.397
 TOPICS = {
     'reference': ('/reference', 'maglev_msgs/msg/Reference'),
@@ -157,5 +157,6 @@ def write_samples(writer: BagWriter, run: Run, messages: dict[str, list[bytes]])
     """All samples of a run in bursts, topic by topic, as a recorder that polls writes them."""
     for first in range(0, len(run), 40):
         for key, (topic, _) in TOPICS.items():
-            for n in range(first, min(first + 40, len(run))):
-                writer.write(topic, int(run.stamp[n]), messages[key][n])
+            part = slice(first, first + 40)
+            stamps = run.stamp[part].tolist()
+            writer.write(topic, zip(messages[key][part], stamps, strict=True))

@@ -15,9 +15,10 @@ from maglev_controller.supervision import Mode, Supervisor
 from maglev_model.parameters import build, parameter, specs, values
 from maglev_model.phases import Phase
 from maglev_msgs.msg import ControllerState, Currents, Measurement, Reference
+from maglev_node.graph_guard import GraphGuard
 from maglev_node.node import MaglevNode, SourceParameters
-from maglev_node.node import main as run_main
 from maglev_node.polling import Queues
+from maglev_node.process import main as run_main
 from maglev_node.stamp import copy_stamp, stamp_now
 from maglev_node.topics import CONTROLLER_STATE, CURRENTS, MEASUREMENT, REFERENCE, sample_qos
 
@@ -68,7 +69,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         self._logged = (self.supervisor.mode, self.supervisor.reason)
         self._currents, self._state = Currents(), ControllerState()
         self._currents.header.frame_id = self._state.header.frame_id = 'stage'
-        self.claim(CURRENTS, 'controller')
+        GraphGuard(self).claim(CURRENTS, 'controller')
         self._currents_publisher = self.create_publisher(Currents, CURRENTS, sample_qos())
         self._state_publisher = self.create_publisher(
             ControllerState, CONTROLLER_STATE, sample_qos()

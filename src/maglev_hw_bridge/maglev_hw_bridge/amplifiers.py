@@ -8,16 +8,15 @@ goes on nevertheless trips.
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from typing import Annotated, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_model.axes import FloatArray
 from maglev_model.commutation import SCALES, phase_currents
 from maglev_model.compiled import compiled
-
-FloatArray = NDArray[np.float64]
+from maglev_model.records import Block, Record
 
 # What drive() returns.
 FINE: Final = 0
@@ -26,92 +25,94 @@ OVER_LIMIT: Final = 2  # the command
 OVER_CURRENT: Final = 3  # of a phase
 SPENT: Final = 4  # I²t
 
-# Indices into settings.
-WAVE: Final = 0  # electrical angle per displacement, pi / tau [rad/m]
-SCALE: Final = 1  # phase amplitude per dq current
-PEAK: Final = 2  # [A]
-CONTINUOUS: Final = 3
-COMMAND_LIMIT: Final = 4
-TRIP_CURRENT: Final = 5
-SLEW_STEP: Final = 6  # greatest change per sample [A]
-RANGE: Final = 7  # [V]
-HEATING: Final = 8  # 1 - exp(-sample time / thermal time)
-DERATE: Final = 9  # load
-DERATED: Final = 10  # load at which only the continuous current is left
-TRIP: Final = 11  # load
-ANGLE: Final = 12  # of motors 1..4 at displacement 0 [rad]
-SETTINGS: Final = 16
 
-
-class AmplifierArrays(NamedTuple):
+class AmplifierArrays(Record):
     """What :func:`drive` takes; twelve phases: a, b, c of motor 1, then 2, 3, 4."""
 
-    settings: FloatArray  # (SETTINGS,)
-    per_ampere: FloatArray  # (12,) [V/A], with the sign
-    offset: FloatArray  # (12,) [V]
-    wanted: FloatArray  # (12,) phase currents before limits [A]
-    current: FloatArray  # (12,) phase currents put out [A]
-    load: FloatArray  # (12,) I²t load
-    volts: FloatArray  # (12,) put out [V]
+    wave: float  # electrical angle per displacement, pi / tau [rad/m]
+    scale: float  # phase amplitude per dq current
+    angle: Annotated[FloatArray, 4]  # of motors 1..4 at displacement 0 [rad]
+    command_limit: float  # of a motor's dq amplitude [A]
+    trip_current: float  # of a phase [A]
+    peak: float  # [A]
+    continuous: float  # [A]
+    slew_step: float  # greatest change per sample [A]
+    voltage_range: float  # [V]
+    heating: float  # 1 - exp(-sample time / thermal time)
+    derate: float  # load from which on the peak shrinks
+    derated: float  # load at which only the continuous current is left
+    trip: float  # load
+    per_ampere: Annotated[FloatArray, 12]  # [V/A], with the sign
+    offset: Annotated[FloatArray, 12]  # [V]
+    wanted: Annotated[FloatArray, 12]  # phase currents before limits [A]
+    current: Annotated[FloatArray, 12]  # phase currents put out [A]
+    load: Annotated[FloatArray, 12]  # I²t load
+    volts: Annotated[FloatArray, 12]  # put out [V]
 
 
 @compiled
-def _limit(s: FloatArray, load: float) -> float:
+def _limit(amplifier: AmplifierArrays, load: float) -> float:
     """Largest current [A] a phase may carry at its I²t load."""
-    if load <= s[DERATE]:
-        return float(s[PEAK])
-    share = min((load - s[DERATE]) / (s[DERATED] - s[DERATE]), 1.0)
-    return float(s[PEAK] + share * (s[CONTINUOUS] - s[PEAK]))
+    peak, continuous = amplifier.peak, amplifier.continuous
+    if load <= amplifier.derate:
+        return peak
+    way = min((load - amplifier.derate) / (amplifier.derated - amplifier.derate), 1.0)
+    return peak + way * (continuous - peak)
 
 
 @compiled
-def _put_out(arrays: AmplifierArrays) -> bool:
+def _put_out(amplifier: AmplifierArrays) -> bool:
     """Bring the wanted currents within all limits and to volts; whether a budget is spent."""
-    s = arrays.settings
+    slew_step, voltage_range = amplifier.slew_step, amplifier.voltage_range
     spent = False
     for i in range(12):
-        limit = _limit(s, arrays.load[i])
-        current = min(max(arrays.wanted[i], -limit), limit)
-        last = arrays.current[i]
-        current = min(max(current, last - s[SLEW_STEP]), last + s[SLEW_STEP])
-        volts = arrays.offset[i] + arrays.per_ampere[i] * current
-        if abs(volts) > s[RANGE]:
-            volts = math.copysign(s[RANGE], volts)
-            current = (volts - arrays.offset[i]) / arrays.per_ampere[i]
-        ratio = current / s[CONTINUOUS]
-        arrays.load[i] += s[HEATING] * (ratio * ratio - arrays.load[i])
-        arrays.current[i] = current
-        arrays.volts[i] = volts
-        spent = spent or arrays.load[i] >= s[TRIP]
+        limit = _limit(amplifier, amplifier.load[i])
+        current = min(max(amplifier.wanted[i], -limit), limit)
+        last = amplifier.current[i]
+        current = min(max(current, last - slew_step), last + slew_step)
+        volts = amplifier.offset[i] + amplifier.per_ampere[i] * current
+        if abs(volts) > voltage_range:
+            volts = math.copysign(voltage_range, volts)
+            current = (volts - amplifier.offset[i]) / amplifier.per_ampere[i]
+        ratio = current / amplifier.continuous
+        amplifier.load[i] += amplifier.heating * (ratio * ratio - amplifier.load[i])
+        amplifier.current[i] = current
+        amplifier.volts[i] = volts
+        spent = spent or amplifier.load[i] >= amplifier.trip
     return spent
 
 
 @compiled
-def drive(
-    arrays: AmplifierArrays, i_d: FloatArray, i_q: FloatArray, x: float, z: float
-) -> tuple[int, int]:
+def _drive_phases(block: Block, current: FloatArray) -> None:
+    amplifier: AmplifierArrays = block[0]
+    amplifier.wanted[:] = current
+    _put_out(amplifier)
+
+
+@compiled
+def drive(block: Block, i_d: FloatArray, i_q: FloatArray, x: float, z: float) -> tuple[int, int]:
     """Turn ``i_d``, ``i_q`` of motors 1..4 [A] at ``x``, ``z`` [m] into ``volts``.
 
     Returns a code and the motor or phase (from 0) it is about. When the command is refused
     (NOT_FINITE, OVER_LIMIT, OVER_CURRENT) the volts stay as they were.
     """
-    s = arrays.settings
+    amplifier: AmplifierArrays = block[0]
     for motor in range(4):
         if not (math.isfinite(i_d[motor]) and math.isfinite(i_q[motor])):
             return NOT_FINITE, motor
-        if math.hypot(i_d[motor], i_q[motor]) > s[COMMAND_LIMIT]:
+        if math.hypot(i_d[motor], i_q[motor]) > amplifier.command_limit:
             return OVER_LIMIT, motor
     for motor in range(4):
-        angle = s[ANGLE + motor] + s[WAVE] * (z if motor % 2 == 0 else x)
-        a, b, c = phase_currents(i_d[motor], i_q[motor], angle, s[SCALE])
-        arrays.wanted[3 * motor] = a
-        arrays.wanted[3 * motor + 1] = b
-        arrays.wanted[3 * motor + 2] = c
+        angle = amplifier.angle[motor] + amplifier.wave * (z if motor % 2 == 0 else x)
+        a, b, c = phase_currents(i_d[motor], i_q[motor], angle, amplifier.scale)
+        amplifier.wanted[3 * motor] = a
+        amplifier.wanted[3 * motor + 1] = b
+        amplifier.wanted[3 * motor + 2] = c
     for i in range(12):
-        if abs(arrays.wanted[i]) > s[TRIP_CURRENT]:
+        if abs(amplifier.wanted[i]) > amplifier.trip_current:
             return OVER_CURRENT, i
-    if _put_out(arrays):
-        return SPENT, int(np.argmax(arrays.load))
+    if _put_out(amplifier):
+        return SPENT, int(np.argmax(amplifier.load))
     return FINE, 0
 
 
@@ -120,39 +121,33 @@ class Amplifiers:
 
     def __init__(self, parameters: BridgeParameters) -> None:
         amplifier, commutation = parameters.amplifier, parameters.commutation
-        settings = np.zeros(SETTINGS)
-        settings[WAVE] = math.pi / parameters.machine.pole_pitch
-        settings[SCALE] = SCALES[commutation.dq_scaling]
-        settings[PEAK] = amplifier.peak_current
-        settings[CONTINUOUS] = amplifier.continuous_current
-        settings[COMMAND_LIMIT] = parameters.fault.command_limit
-        settings[TRIP_CURRENT] = parameters.fault.over_current
-        settings[SLEW_STEP] = amplifier.slew * parameters.sample_time
-        settings[RANGE] = amplifier.voltage_range
-        settings[HEATING] = -math.expm1(-parameters.sample_time / amplifier.thermal_time)
-        settings[DERATE] = amplifier.derate_load
-        settings[DERATED] = 0.5 * (amplifier.derate_load + amplifier.trip_load)
-        settings[TRIP] = amplifier.trip_load
-        settings[ANGLE : ANGLE + 4] = commutation.offset
         self._warn_load = amplifier.warn_load
         self.arrays = AmplifierArrays(
-            settings=settings,
+            wave=math.pi / parameters.machine.pole_pitch,
+            scale=SCALES[commutation.dq_scaling],
+            angle=commutation.offset,
+            command_limit=parameters.fault.command_limit,
+            trip_current=parameters.fault.over_current,
+            peak=amplifier.peak_current,
+            continuous=amplifier.continuous_current,
+            slew_step=amplifier.slew * parameters.sample_time,
+            voltage_range=amplifier.voltage_range,
+            heating=-math.expm1(-parameters.sample_time / amplifier.thermal_time),
+            derate=amplifier.derate_load,
+            derated=0.5 * (amplifier.derate_load + amplifier.trip_load),
+            trip=amplifier.trip_load,
             per_ampere=np.array(amplifier.sign) / np.array(amplifier.gain),
-            offset=np.array(amplifier.offset),
-            wanted=np.zeros(12),
-            current=np.zeros(12),
-            load=np.zeros(12),
-            volts=np.array(amplifier.offset),
+            offset=amplifier.offset,
+            volts=amplifier.offset,
         )
 
     def drive(self, i_d: FloatArray, i_q: FloatArray, x: float, z: float) -> tuple[int, int]:
         """Write the volts for dq currents; see :func:`drive`."""
-        return drive(self.arrays, i_d, i_q, x, z)
+        return drive(self.arrays.block, i_d, i_q, x, z)
 
     def drive_phases(self, current: FloatArray) -> FloatArray:
         """Volts (12,) for phase currents (12,) [A] within all limits, for commissioning."""
-        self.arrays.wanted[:] = current
-        _put_out(self.arrays)
+        _drive_phases(self.arrays.block, current)
         return self.arrays.volts
 
     def cut(self) -> FloatArray:

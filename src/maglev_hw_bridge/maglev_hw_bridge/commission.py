@@ -12,20 +12,20 @@ import time
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from maglev_hw_bridge.diagnosis import diagnose
 from maglev_hw_bridge.drivers import Driver, DriverError, make_driver
 from maglev_hw_bridge.encoders import Encoders, HomingError
-from maglev_hw_bridge.landing import currents
+from maglev_hw_bridge.landing import LEAST_ATTRACTION
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.response import Pulses, Twins
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES, PHASE_NAMES, PHASES
 from maglev_hw_bridge.stage import BridgeStage, Mode
+from maglev_model.axes import FloatArray
+from maglev_model.inverse import CurrentLimits, exact_currents
+from maglev_model.machine import machine_constants
 from maglev_model.parameters import ParameterError, from_yaml
 from maglev_model.stage import StageError
-
-FloatArray = NDArray[np.float64]
 
 _HOP = 5e-4  # first lift-off [m]
 _RISE, _HOVER = 0.5, 0.5  # [s]
@@ -166,8 +166,8 @@ def _hop(stage: BridgeStage, parameters: BridgeParameters) -> tuple[float, float
     """Rise, hover, land: greatest rise [m] and tilt [rad] while it hovers."""
     period, landing = parameters.sample_time, parameters.landing
     stiffness, damping = np.array(landing.stiffness), np.array(landing.damping)
-    watched, machine = stage.guard.arrays, stage.landing.arrays.machine
-    i_d, i_q = np.zeros(4), np.zeros(4)
+    watched, machine = stage.guard.arrays, machine_constants(parameters.machine)
+    limits = CurrentLimits(landing.current, 1.0, LEAST_ATTRACTION)
     stage.read()
     stage.hold()
     stage.read()
@@ -176,19 +176,19 @@ def _hop(stage: BridgeStage, parameters: BridgeParameters) -> tuple[float, float
     target[3:] = 0.0
     heights, tilt = [], 0.0
     for n in range(round((_RISE + _HOVER) / period)):
-        share = min(n * period / _RISE, 1.0)
-        target[0] = start - _HOP * share**2 * (3.0 - 2.0 * share)
+        risen = min(n * period / _RISE, 1.0)
+        target[0] = start - _HOP * risen**2 * (3.0 - 2.0 * risen)
         wanted = stiffness * (target - watched.position) - damping * watched.rate
-        currents(machine, watched.position, wanted, landing.current, i_d, i_q)
-        stage.write(i_d, i_q)
+        i_d, i_q, _ = exact_currents(machine, watched.position[None], wanted[None], limits)
+        stage.write(i_d[0], i_q[0])
         stage.read()
-        if share >= 1.0:
+        if risen >= 1.0:
             heights.append(rest - watched.position[0])
             tilt = max(tilt, float(np.max(np.abs(watched.position[3:]))))
         if stage.mode is not Mode.FOLLOWING:
             break
     stage.land('commissioned')
-    while stage.flying or stage.mode is Mode.LANDING:
+    while stage.flying:
         stage.hold()
         stage.read()
     return float(np.mean(heights)) if heights else 0.0, tilt

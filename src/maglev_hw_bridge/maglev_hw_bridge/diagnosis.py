@@ -7,11 +7,9 @@ from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES, ENCODERS, PHASE_NAMES, PHASES
-
-FloatArray = NDArray[np.float64]
+from maglev_model.axes import FloatArray
 
 _SEEN = np.array([3e-5] * 4 + [1e-4] * 2)  # less is no answer [m]
 _CLEAR = np.array([1.2e-4] * 4 + [4e-4] * 2)  # more says no more [m]

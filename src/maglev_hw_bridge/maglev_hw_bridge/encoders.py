@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES
+from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
+from maglev_model.records import Block, Record
 
-FloatArray = NDArray[np.float64]
 CountArray = NDArray[np.int32]
 
 _HALF = 2**31
@@ -22,28 +23,29 @@ class HomingError(RuntimeError):
     """Homing was refused; the message says why and what to do."""
 
 
-class EncoderArrays(NamedTuple):
+class EncoderArrays(Record):
     """What :func:`decode` takes; six encoders: the gaps of motors 1..4, x, z."""
 
-    scale: FloatArray  # (6,) [m/count], with the direction's sign
-    zero: FloatArray  # (6,) length at total 0 [m]
-    last: CountArray  # (6,) the counts decoded last
-    total: NDArray[np.int64]  # (6,) counts without roll-over
-    length: FloatArray  # (6,) [m], the result
+    scale: Annotated[FloatArray, 6]  # [m/count], with the direction's sign
+    zero: Annotated[FloatArray, 6]  # length at total 0 [m]
+    last: Annotated[CountArray, 6]  # the counts decoded last
+    total: Annotated[NDArray[np.int64], 6]  # counts without roll-over
+    length: Annotated[FloatArray, 6]  # [m], the result
 
 
 @compiled
-def decode(arrays: EncoderArrays, counts: CountArray) -> None:
+def decode(block: Block, counts: CountArray) -> None:
     """Follow ``counts`` (6,) over roll-overs of the 32-bit counters and write ``length`` [m]."""
+    encoder: EncoderArrays = block[0]
     for i in range(6):
-        step = np.int64(counts[i]) - np.int64(arrays.last[i])
+        step = np.int64(counts[i]) - np.int64(encoder.last[i])
         if step >= _HALF:
             step -= 2 * _HALF
         elif step < -_HALF:
             step += 2 * _HALF
-        arrays.last[i] = counts[i]
-        arrays.total[i] += step
-        arrays.length[i] = arrays.zero[i] + arrays.scale[i] * arrays.total[i]
+        encoder.last[i] = counts[i]
+        encoder.total[i] += step
+        encoder.length[i] = encoder.zero[i] + encoder.scale[i] * encoder.total[i]
 
 
 class Encoders:
@@ -58,21 +60,18 @@ class Encoders:
         self.homed = False
         self.arrays = EncoderArrays(
             scale=np.array(encoder.resolution) * np.array(encoder.direction),
-            zero=np.array(encoder.zero),
-            last=np.zeros(6, dtype=np.int32),
-            total=np.zeros(6, dtype=np.int64),
-            length=np.zeros(6),
+            zero=encoder.zero,
         )
 
     def start(self, counts: CountArray) -> None:
         """Take ``counts`` (6,) as they are for the totals; call before the first decoding."""
         self.arrays.last[:] = counts
         self.arrays.total[:] = counts
-        decode(self.arrays, counts)
+        decode(self.arrays.block, counts)
 
     def decode(self, counts: CountArray) -> FloatArray:
         """Lengths [m] of gaps 1..4, x, z, shape (6,); the same array at each call."""
-        decode(self.arrays, counts)
+        decode(self.arrays.block, counts)
         return self.arrays.length
 
     def beyond_stops(self) -> str:

@@ -2,31 +2,18 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from maglev_hw_bridge import amplifiers, guard
 from maglev_hw_bridge.amplifiers import Amplifiers
 from maglev_hw_bridge.guard import Guard
+from maglev_hw_bridge.landing import impact_of_cut
+from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES, PHASE_NAMES
 from maglev_model.axes import AXES
 
 FloatArray = NDArray[np.float64]
-
-
-class Fault(NamedTuple):
-    """A latched fault."""
-
-    kind: str  # a word
-    reason: str  # what happened
-    remedy: str  # what to do
-    cut: bool  # whether the current was cut at once
-
-    def __str__(self) -> str:
-        action = 'currents cut' if self.cut else 'landed by the bridge'
-        return f'{self.reason} ({action}); {self.remedy}, then call ~/reset'
 
 
 def range_fault(code: int, index: int, watched: Guard) -> tuple[str, str]:
@@ -69,3 +56,33 @@ def command_fault(
         f'{PHASE_NAMES[index]} has spent its I2t budget (load {amplifier.load:.2f})',
         'let the amplifiers cool',
     )
+
+
+def stale_fault(age: float) -> tuple[str, str]:
+    """Reason and remedy of a controller that has been silent for so long [s]."""
+    return f'no fresh currents for {age * 1e3:.0f} ms', 'start the controller again'
+
+
+def overrun_fault(late: float) -> tuple[str, str]:
+    """Reason and remedy of a sample that was read so late [s]."""
+    return f'a sample was read {late * 1e3:.1f} ms late', 'free the machine of other load'
+
+
+def consequence_of_cut(parameters: BridgeParameters, watched: Guard) -> str:
+    """What to add to the reason of a fault that cuts the currents in flight."""
+    state = watched.arrays
+    speed, stop = impact_of_cut(parameters, state.position[0], state.rate[0])
+    return f'; the platen strikes the {stop} stop at about {speed:.2f} m/s'
+
+
+def remaining_cause(
+    parameters: BridgeParameters, stop_pressed: bool, watched: Guard, amplifier: Amplifiers
+) -> str:
+    """What still speaks against clearing a fault, or nothing."""
+    if stop_pressed:
+        return 'the emergency stop is pressed'
+    if abs(watched.residual) > parameters.fault.residual:
+        return f'g1 + g3 - g2 - g4 is {watched.residual * 1e6:.0f} um: home again'
+    if amplifier.load > parameters.amplifier.derate_load:
+        return f'the amplifiers are hot, I2t load {amplifier.load:.2f}: let them cool'
+    return ''

@@ -8,18 +8,15 @@ z that stands still in motion, nor gaps that contradict each other and none stan
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Annotated, Final
 
 from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
-from maglev_model.machine import machine_constants, machine_from_array, machine_to_array
+from maglev_model.machine import MachineArray, machine_constants, machine_from_array
 from maglev_model.motor import attraction_coefficients
 from maglev_model.platen import outputs_from_gaps
-
-FloatArray = NDArray[np.float64]
+from maglev_model.records import Block, Record
 
 # What watch() returns.
 FINE: Final = 0
@@ -29,27 +26,8 @@ RESIDUAL: Final = 3
 GAP_RANGE: Final = 4
 RANGE: Final = 5
 
-# Indices into limits.
-PERIOD: Final = 0  # [s]
-RATE: Final = 1  # share of a new difference quotient in the rate
-SLOW_RATE: Final = 2  # likewise in the rate that a stuck encoder is judged by
-MAX_JUMP: Final = 3  # [m]
-MAX_RESIDUAL: Final = 4
-MAX_UNSEEN_GAP: Final = 5
-MAX_UNSEEN: Final = 6
-FRICTION: Final = 7  # [m/s²]
-GAP_LOWER: Final = 8  # [m]
-GAP_UPPER: Final = 9
-X_STOP: Final = 10
-Z_STOP: Final = 11
-LOWER: Final = 12  # y, x, z, phi, theta
-UPPER: Final = 17
-LIMITS: Final = 22
-
-# Indices into mended.
-MENDED: Final = 0  # the encoder that is done without, -1: none
-OFFSET: Final = 1  # what x or z reads too much [m]
-JUST_NOW: Final = 2  # 1: since this sample
+NONE: Final = -1
+"""No encoder is done without."""
 
 _AHEAD = 1e-3  # [s]
 _SLOW_BANDWIDTH = 100.0  # [rad/s]
@@ -58,22 +36,39 @@ _SLIP = 1e-4  # [m]
 _STOP_MARGIN = 3e-4  # this near a horizontal stop a force need not move the platen [m]
 
 
-class GuardArrays(NamedTuple):
-    """What :func:`watch` takes."""
+class GuardArrays(Record):
+    """What :func:`watch` takes: bounds, and what it has seen; lengths are gaps 1..4, x, z [m]."""
 
-    machine: FloatArray  # (24,)
-    limits: FloatArray  # (LIMITS,)
-    believed: FloatArray  # (6,) lengths, put right where one encoder fails [m]
-    mended: FloatArray  # (3,): see the indices above
-    past: FloatArray  # (2, 6) believed lengths of the last sample and the one before [m]
-    seen: FloatArray  # (2,): samples seen, samples in a row with too large a residual
-    residual: FloatArray  # (1,): g1 + g3 - g2 - g4 as it is read [m]
-    still: FloatArray  # (6,): gaps: what the others told at its last change; x, z: way unseen [m]
-    slow: FloatArray  # (2,) rates of x, z that a stuck encoder is judged by [m/s]
-    i_q: FloatArray  # (4,) put out last [A]
-    position: FloatArray  # (5,) y, x, z, phi, theta [m, rad]
-    rate: FloatArray  # (5,) [m/s, rad/s]
-    gap_rate: FloatArray  # (4,) [m/s]
+    machine: MachineArray
+    period: float  # [s]
+    rate_gain: float  # share of a new difference quotient in the rate
+    slow_rate_gain: float  # likewise in the rate that a stuck encoder is judged by
+    max_jump: float  # [m]
+    max_residual: float  # [m]
+    max_unseen_gap: float  # [m]
+    max_unseen: float  # [m]
+    friction: float  # [m/s²]
+    gap_lower: float  # [m]
+    gap_upper: float  # [m]
+    horizontal_stop: Annotated[FloatArray, 2]  # of x, z [m]
+    lower: Annotated[FloatArray, 5]  # y, x, z, phi, theta [m, rad]
+    upper: Annotated[FloatArray, 5]
+
+    believed: Annotated[FloatArray, 6]  # lengths, put right where one encoder fails
+    mended: int  # the encoder that is done without, or NONE
+    offset: float  # what x or z reads too much [m]
+    just_mended: bool  # since this sample
+    past: Annotated[FloatArray, 2, 6]  # believed lengths of the last sample and the one before
+    samples: int  # seen
+    contradictions: int  # samples in a row with too large a residual
+    residual: float  # g1 + g3 - g2 - g4 as it is read [m]
+    # Gaps: what the other three told at its last change; x, z: how far it should have moved since.
+    still: Annotated[FloatArray, 6]
+    slow_rate: Annotated[FloatArray, 2]  # of x, z, that a stuck encoder is judged by [m/s]
+    i_q: Annotated[FloatArray, 4]  # put out last [A]
+    position: Annotated[FloatArray, 5]  # y, x, z, phi, theta [m, rad]
+    rate: Annotated[FloatArray, 5]  # [m/s, rad/s]
+    gap_rate: Annotated[FloatArray, 4]  # [m/s]
 
 
 @compiled
@@ -99,9 +94,9 @@ def _stuck_gap(g: GuardArrays, length: FloatArray) -> int:
         others = _others(length, i)
         if abs(slip) > _SLIP:
             g.still[i] += others - _others(g.past[0], i)
-        if g.seen[0] == 0.0 or length[i] != g.past[0, i]:
+        if g.samples == 0 or length[i] != g.past[0, i]:
             g.still[i] = others
-        elif abs(others - g.still[i]) > g.limits[MAX_UNSEEN_GAP]:
+        elif abs(others - g.still[i]) > g.max_unseen_gap:
             return i
     return -1
 
@@ -112,7 +107,7 @@ def _push(g: GuardArrays, length: FloatArray, axis: int) -> float:
     machine = machine_from_array(g.machine)
     force = 0.0
     for motor in range(1 - axis, 4, 2):
-        gap = min(max(length[motor], g.limits[GAP_LOWER]), g.limits[GAP_UPPER])
+        gap = min(max(length[motor], g.gap_lower), g.gap_upper)
         _, _, k_h = attraction_coefficients(machine, gap)
         force -= k_h * g.i_q[motor]
     return float(force / (machine.M_x if axis == 0 else machine.M_z))
@@ -124,41 +119,39 @@ def _stuck_horizontal(g: GuardArrays, length: FloatArray, axis: int) -> bool:
 
     The speed follows the force and, while the encoder counts, what it counts.
     """
-    if g.seen[0] == 0.0:
+    if g.samples == 0:
         return False
-    limits = g.limits
-    i, period = 4 + axis, limits[PERIOD]
+    i, period = 4 + axis, g.period
     step = length[i] - g.past[0, i]
-    speed = g.slow[axis] + _push(g, length, axis) * period
-    if step != 0.0 or abs(length[i]) > limits[X_STOP + axis] - _STOP_MARGIN:
-        g.slow[axis] = speed + limits[SLOW_RATE] * (step / period - speed)
+    speed = g.slow_rate[axis] + _push(g, length, axis) * period
+    if step != 0.0 or abs(length[i]) > g.horizontal_stop[axis] - _STOP_MARGIN:
+        g.slow_rate[axis] = speed + g.slow_rate_gain * (step / period - speed)
         g.still[i] = 0.0
         return False
-    speed = math.copysign(max(abs(speed) - limits[FRICTION] * period, 0.0), speed)
-    g.slow[axis] = speed
+    speed = math.copysign(max(abs(speed) - g.friction * period, 0.0), speed)
+    g.slow_rate[axis] = speed
     g.still[i] += speed * period
-    return bool(abs(g.still[i]) > limits[MAX_UNSEEN])
+    return bool(abs(g.still[i]) > g.max_unseen)
 
 
 @compiled
 def _believe(g: GuardArrays, length: FloatArray) -> None:
     """Fill in what is believed of the lengths (6,) that are read [m]."""
     g.believed[:] = length
-    encoder = int(g.mended[MENDED])
-    if encoder >= 4:
-        g.believed[encoder] -= g.mended[OFFSET]
-    elif encoder >= 0:
-        g.believed[encoder] = _others(length, encoder)
+    if g.mended >= 4:
+        g.believed[g.mended] -= g.offset
+    elif g.mended != NONE:
+        g.believed[g.mended] = _others(length, g.mended)
 
 
 @compiled
 def _mend(g: GuardArrays, length: FloatArray, code: int, encoder: int) -> bool:
     """Do without an encoder from now on; whether that can be done."""
-    if g.mended[MENDED] >= 0.0 or (code == STUCK and encoder >= 4):
+    if g.mended != NONE or (code == STUCK and encoder >= 4):
         return False
-    g.mended[MENDED], g.mended[JUST_NOW] = encoder, 1.0
+    g.mended, g.just_mended = encoder, True
     if encoder >= 4:
-        g.mended[OFFSET] = length[encoder] - _foreseen(g, encoder)
+        g.offset = length[encoder] - _foreseen(g, encoder)
     else:
         g.gap_rate[encoder] = _others(g.gap_rate, encoder)
     _believe(g, length)
@@ -171,14 +164,14 @@ def _estimate(g: GuardArrays) -> None:
     machine = machine_from_array(g.machine)
     before = g.position.copy()
     outputs_from_gaps(machine, g.believed[:4], g.believed[4], g.believed[5], g.position)
-    if g.seen[0] == 0.0:
+    if g.samples == 0:
         return
-    share, period = g.limits[RATE], g.limits[PERIOD]
+    gain, period = g.rate_gain, g.period
     for axis in range(5):
-        g.rate[axis] += share * ((g.position[axis] - before[axis]) / period - g.rate[axis])
+        g.rate[axis] += gain * ((g.position[axis] - before[axis]) / period - g.rate[axis])
     for i in range(4):
         quotient = (g.believed[i] - g.past[0, i]) / period
-        g.gap_rate[i] += share * (quotient - g.gap_rate[i])
+        g.gap_rate[i] += gain * (quotient - g.gap_rate[i])
 
 
 @compiled
@@ -195,12 +188,11 @@ def _estimate_mended(g: GuardArrays) -> None:
 
 @compiled
 def _out_of_range(g: GuardArrays, length: FloatArray) -> tuple[int, int]:
-    limits = g.limits
     for axis in range(5):
-        if not limits[LOWER + axis] <= g.position[axis] <= limits[UPPER + axis]:
+        if not g.lower[axis] <= g.position[axis] <= g.upper[axis]:
             return RANGE, axis
     for i in range(4):
-        if not limits[GAP_LOWER] <= length[i] <= limits[GAP_UPPER]:
+        if not g.gap_lower <= length[i] <= g.gap_upper:
             return GAP_RANGE, i
     return FINE, 0
 
@@ -214,9 +206,9 @@ def _foreseen(g: GuardArrays, i: int) -> float:
 @compiled
 def _unbelievable(g: GuardArrays, length: FloatArray, flying: bool) -> tuple[int, int]:
     for i in range(6):
-        if i < 4 and i == g.mended[MENDED]:
+        if i < 4 and i == g.mended:
             continue
-        if g.seen[0] >= 2.0 and abs(length[i] - _foreseen(g, i)) > g.limits[MAX_JUMP]:
+        if g.samples >= 2 and abs(length[i] - _foreseen(g, i)) > g.max_jump:
             return JUMP, i
     stuck = _stuck_gap(g, length)
     for axis in range(2):
@@ -228,14 +220,15 @@ def _unbelievable(g: GuardArrays, length: FloatArray, flying: bool) -> tuple[int
 
 
 @compiled
-def watch(g: GuardArrays, length: FloatArray, flying: bool) -> tuple[int, int]:
+def watch(block: Block, length: FloatArray, flying: bool) -> tuple[int, int]:
     """Judge one sample: ``length`` (6,), gaps 1..4, x, z [m]; updates position and rate.
 
     Returns a code and the encoder or axis it is about; ``mended`` tells whether the encoder is done
     without from now on. Range and stuck encoders count in flight.
     """
-    g.residual[0] = _residual(length)
-    g.mended[JUST_NOW] = 0.0
+    g: GuardArrays = block[0]
+    g.residual = _residual(length)
+    g.just_mended = False
     _believe(g, length)
     code, index = _unbelievable(g, g.believed, flying)
     if code == STUCK and _mend(g, length, code, index):
@@ -244,15 +237,16 @@ def watch(g: GuardArrays, length: FloatArray, flying: bool) -> tuple[int, int]:
         if code == JUMP:
             _mend(g, length, code, index)
         _estimate(g)
-    g.seen[1] = g.seen[1] + 1.0 if abs(_residual(g.believed)) > g.limits[MAX_RESIDUAL] else 0.0
-    if code == FINE and g.seen[1] >= _RESIDUAL_SAMPLES:
+    contradicting = abs(_residual(g.believed)) > g.max_residual
+    g.contradictions = g.contradictions + 1 if contradicting else 0
+    if code == FINE and g.contradictions >= _RESIDUAL_SAMPLES:
         code = RESIDUAL
     if code == FINE and flying:
         code, index = _out_of_range(g, g.believed)
     for i in range(6):
-        g.past[1, i] = g.past[0, i] if g.seen[0] > 0.0 else g.believed[i]
+        g.past[1, i] = g.past[0, i] if g.samples > 0 else g.believed[i]
         g.past[0, i] = g.believed[i]
-    g.seen[0] += 1.0
+    g.samples += 1
     return code, index
 
 
@@ -262,51 +256,42 @@ class Guard:
     def __init__(self, parameters: BridgeParameters) -> None:
         fault, machine = parameters.fault, parameters.machine
         period = parameters.sample_time
-        limits = np.zeros(LIMITS)
-        limits[PERIOD] = period
-        limits[RATE] = -math.expm1(-parameters.landing.rate_bandwidth * period)
-        limits[SLOW_RATE] = -math.expm1(-_SLOW_BANDWIDTH * period)
-        limits[MAX_JUMP] = fault.jump
-        limits[MAX_RESIDUAL] = fault.residual
-        limits[MAX_UNSEEN_GAP] = fault.stuck_gap
-        limits[MAX_UNSEEN] = fault.stuck_horizontal
-        limits[FRICTION] = fault.friction
-        limits[GAP_LOWER], limits[GAP_UPPER] = fault.gap_lower, fault.gap_upper
-        limits[X_STOP], limits[Z_STOP] = machine.x_max, machine.z_max
-        limits[LOWER : LOWER + 5], limits[UPPER : UPPER + 5] = fault.lower, fault.upper
         self.arrays = GuardArrays(
-            machine=machine_to_array(machine_constants(machine)),
-            limits=limits,
-            believed=np.zeros(6),
-            mended=np.array([-1.0, 0.0, 0.0]),
-            past=np.zeros((2, 6)),
-            seen=np.zeros(2),
-            residual=np.zeros(1),
-            still=np.zeros(6),
-            slow=np.zeros(2),
-            i_q=np.zeros(4),
-            position=np.zeros(5),
-            rate=np.zeros(5),
-            gap_rate=np.zeros(4),
+            machine=machine_constants(machine),
+            period=period,
+            rate_gain=-math.expm1(-parameters.landing.rate_bandwidth * period),
+            slow_rate_gain=-math.expm1(-_SLOW_BANDWIDTH * period),
+            max_jump=fault.jump,
+            max_residual=fault.residual,
+            max_unseen_gap=fault.stuck_gap,
+            max_unseen=fault.stuck_horizontal,
+            friction=fault.friction,
+            gap_lower=fault.gap_lower,
+            gap_upper=fault.gap_upper,
+            horizontal_stop=(machine.x_max, machine.z_max),
+            lower=fault.lower,
+            upper=fault.upper,
+            mended=NONE,
         )
 
     def forget(self) -> None:
         """Begin anew: the next sample is the first."""
-        a = self.arrays
-        for array in (a.seen, a.slow, a.rate, a.gap_rate, a.i_q, a.still):
+        g = self.arrays
+        g.samples = g.contradictions = 0
+        g.mended, g.offset, g.just_mended = NONE, 0.0, False
+        for array in (g.slow_rate, g.rate, g.gap_rate, g.i_q, g.still):
             array[:] = 0.0
-        a.mended[:] = -1.0, 0.0, 0.0
 
     def watch(self, length: FloatArray, flying: bool) -> tuple[int, int]:
         """Judge one sample; see :func:`watch`."""
-        return watch(self.arrays, length, flying)
+        return watch(self.arrays.block, length, flying)
 
     @property
     def residual(self) -> float:
         """``g1 + g3 - g2 - g4`` of the last sample, as it was read [m]."""
-        return float(self.arrays.residual[0])
+        return self.arrays.residual
 
     @property
     def mended(self) -> bool:
         """Whether what the last sample found wrong with an encoder is put right from then on."""
-        return bool(self.arrays.mended[JUST_NOW])
+        return self.arrays.just_mended

@@ -6,10 +6,10 @@ import dataclasses
 
 from maglev_hw_bridge.emulation_parameters import EmulationParameters
 from maglev_hw_bridge.signal_parameters import (
-    AmplifierParameters,
     BoardParameters,
     CommutationParameters,
-    EncoderParameters,
+    DriveParameters,
+    EncoderInputParameters,
     HomingParameters,
 )
 from maglev_model.machine import MachineParameters
@@ -114,7 +114,7 @@ class FaultParameters:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class LandingParameters:
+class BridgeLandingParameters:
     """How the bridge lands the platen without a controller."""
 
     braking_time: float = parameter(
@@ -169,12 +169,12 @@ class BridgeParameters:
     )
     machine: MachineParameters = group(MachineParameters)
     commutation: CommutationParameters = group(CommutationParameters)
-    encoder: EncoderParameters = group(EncoderParameters)
+    encoder: EncoderInputParameters = group(EncoderInputParameters)
     homing: HomingParameters = group(HomingParameters)
-    amplifier: AmplifierParameters = group(AmplifierParameters)
+    amplifier: DriveParameters = group(DriveParameters)
     boards: BoardParameters = group(BoardParameters)
     fault: FaultParameters = group(FaultParameters)
-    landing: LandingParameters = group(LandingParameters)
+    landing: BridgeLandingParameters = group(BridgeLandingParameters)
     emulation: EmulationParameters = group(EmulationParameters)
 
     def __post_init__(self) -> None:

@@ -11,7 +11,6 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from numpy.typing import NDArray
 
 from maglev_hw_bridge.amplifiers import Amplifiers
 from maglev_hw_bridge.drivers import Driver
@@ -20,8 +19,7 @@ from maglev_hw_bridge.drivers.quanser import QuanserDriver
 from maglev_hw_bridge.encoders import Encoders
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.signal_parameters import PHASES
-
-FloatArray = NDArray[np.float64]
+from maglev_model.axes import FloatArray
 
 _RISE = 0.1  # to the peak current [s]
 _GAP_ENOUGH = 3e-4  # [m]

@@ -7,19 +7,20 @@ the platen really is; the plant's physics carry the platen.
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from typing import Final, NamedTuple
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.signal_parameters import check_places, check_signs
+from maglev_model.axes import FloatArray
 from maglev_model.commutation import SCALES, direct_quadrature_currents
 from maglev_model.compiled import compiled
 from maglev_model.parameters import ParameterError
-from maglev_plant.arrays import STATE, FloatArray, StageArrays, stage_arrays
+from maglev_model.records import Block, Record
+from maglev_plant.arrays import StageArrays, stage_arrays
 from maglev_plant.dynamics import advance
 from maglev_plant.encoder import encode
 from maglev_plant.parameters import AmplifierParameters, PlantParameters
@@ -27,94 +28,92 @@ from maglev_plant.parameters import AmplifierParameters, PlantParameters
 _TOUCH = 1e-9  # [m]
 _LONGEST_STEP = 1e-4  # of currents and platen [s]; the plant takes no shorter one
 
-# Indices into settings.
-DECAY: Final = 0  # of a current error over a step
-VOLTAGE_DECAY: Final = 1  # of a current at constant voltage over a step
-SHORT_CURRENT: Final = 2  # what the supply's voltage drives through a winding for ever [A]
-PEAK: Final = 3  # [A]
-WAVE: Final = 4  # pi / tau [rad/m]
-SCALE: Final = 5
-GAP_COUNT: Final = 6  # [m]
-HORIZONTAL_COUNT: Final = 7  # [m]
-UPPER_STOP: Final = 8  # [m]
-LOWER_STOP: Final = 9
-SEAT_RADIUS: Final = 10  # of the stops' seats [m]
-ANGLE: Final = 11  # of motors 1..4 at displacement 0 [rad]
-SETTINGS: Final = 15
 
-
-class RigArrays(NamedTuple):
+class RigArrays(Record):
     """What :func:`advance_rig` takes; phases a, b, c of motor 1, then 2, 3, 4."""
 
-    settings: FloatArray  # (SETTINGS,)
-    gain: FloatArray  # (12,) [A/V], with the sign; 0 for a dead phase
-    offset: FloatArray  # (12,) [V]
-    current: FloatArray  # (12,) flowing [A]
-    impact: FloatArray  # (1,) greatest speed of a seat that met a vertical stop [m/s]
+    decay: float  # of a current error over a step
+    voltage_decay: float  # of a current at constant voltage over a step
+    short_current: float  # what the supply's voltage drives through a winding for ever [A]
+    peak: float  # [A]
+    wave: float  # pi / tau [rad/m]
+    scale: float  # phase amplitude per dq current
+    angle: Annotated[FloatArray, 4]  # of motors 1..4 at displacement 0 [rad]
+    gain: Annotated[FloatArray, 12]  # [A/V], with the sign; 0 for a dead phase
+    offset: Annotated[FloatArray, 12]  # [V]
+    gap_count: float  # [m]
+    horizontal_count: float  # [m]
+    upper_stop: float  # [m]
+    lower_stop: float  # [m]
+    seat_radius: float  # of the stops' seats [m]
+    current: Annotated[FloatArray, 12]  # flowing [A]
+    impact: float  # greatest speed of a seat that met a vertical stop [m/s]
 
 
 @compiled
 def _flow(rig: RigArrays, volts: FloatArray) -> None:
     """Carry the phase currents over one step with the boards' outputs held."""
-    s = rig.settings
     for i in range(12):
         target = rig.gain[i] * (volts[i] - rig.offset[i])
-        target = min(max(target, -s[PEAK]), s[PEAK])
-        wanted = target + s[DECAY] * (rig.current[i] - target)
-        rest = s[VOLTAGE_DECAY] * rig.current[i]
-        reach = (1.0 - s[VOLTAGE_DECAY]) * s[SHORT_CURRENT]
+        target = min(max(target, -rig.peak), rig.peak)
+        wanted = target + rig.decay * (rig.current[i] - target)
+        rest = rig.voltage_decay * rig.current[i]
+        reach = (1.0 - rig.voltage_decay) * rig.short_current
         rig.current[i] = min(max(wanted, rest - reach), rest + reach)
 
 
 @compiled
-def _commute(rig: RigArrays, state: FloatArray, before: FloatArray, command: FloatArray) -> None:
+def _commute(rig: RigArrays, stage: StageArrays, before: FloatArray) -> None:
     """i_d and i_q of a step, from the mean of the phase currents before and after it."""
-    s = rig.settings
     for motor in range(4):
-        displacement = state[4] if motor % 2 == 0 else state[2]
-        angle = s[ANGLE + motor] + s[WAVE] * displacement
+        displacement = stage.state[4] if motor % 2 == 0 else stage.state[2]
+        angle = rig.angle[motor] + rig.wave * displacement
         k = 3 * motor
         i_d, i_q = direct_quadrature_currents(
             0.5 * (before[k] + rig.current[k]),
             0.5 * (before[k + 1] + rig.current[k + 1]),
             0.5 * (before[k + 2] + rig.current[k + 2]),
             angle,
-            s[SCALE],
+            rig.scale,
         )
-        command[motor], command[4 + motor] = i_d, i_q
+        stage.command[motor], stage.command[4 + motor] = i_d, i_q
 
 
 @compiled
-def _touching(s: FloatArray, state: FloatArray) -> bool:
+def _touching(rig: RigArrays, stage: StageArrays) -> bool:
     """Whether a seat of the platen is at a vertical stop."""
-    reach = s[SEAT_RADIUS] * max(abs(state[6]), abs(state[8]))
-    low, high = state[0] + reach, state[0] - reach
-    return bool(low >= s[LOWER_STOP] - _TOUCH or high <= s[UPPER_STOP] + _TOUCH)
+    y, phi, theta = stage.state[0], stage.state[6], stage.state[8]
+    reach = rig.seat_radius * max(abs(phi), abs(theta))
+    low, high = y + reach, y - reach
+    return bool(low >= rig.lower_stop - _TOUCH or high <= rig.upper_stop + _TOUCH)
 
 
 @compiled
-def advance_rig(rig: RigArrays, stage: StageArrays, volts: FloatArray, steps: int) -> None:
+def advance_rig(rig_block: Block, stage_block: Block, volts: FloatArray, steps: int) -> None:
     """Carry currents and platen over ``steps`` with the boards' outputs (12,) [V] held."""
-    s = rig.settings
-    state = stage.memory[STATE : STATE + 10]
+    rig: RigArrays = rig_block[0]
+    stage: StageArrays = stage_block[0]
+    state = stage.state
     for _ in range(steps):
         before = rig.current.copy()
         _flow(rig, volts)
-        _commute(rig, state, before, stage.command)
-        away = not _touching(s, state)
+        _commute(rig, stage, before)
+        away = not _touching(rig, stage)
         tilting = max(abs(state[7]), abs(state[9]))
-        speed = abs(state[1]) + s[SEAT_RADIUS] * tilting
-        advance(stage.scalars, stage.axes, stage.memory, stage.command)
-        if away and speed > rig.impact[0] and _touching(s, state):
-            rig.impact[0] = speed
+        speed = abs(state[1]) + rig.seat_radius * tilting
+        advance(stage_block)
+        if away and speed > rig.impact and _touching(rig, stage):
+            rig.impact = speed
 
 
 @compiled
-def count(rig: RigArrays, stage: StageArrays, out: NDArray[np.int64]) -> None:
+def count(rig_block: Block, stage_block: Block, out: NDArray[np.int64]) -> None:
     """Whole counts of the six encoders, ``out`` (6,), from absolute zero."""
-    encode(stage.scalars, stage.memory, stage.reading)
+    rig: RigArrays = rig_block[0]
+    stage: StageArrays = stage_block[0]
+    encode(stage_block)
     for i in range(6):
-        resolution = rig.settings[GAP_COUNT] if i < 4 else rig.settings[HORIZONTAL_COUNT]
+        resolution = rig.gap_count if i < 4 else rig.horizontal_count
         out[i] = math.floor(stage.reading[i] / resolution + 0.5)
 
 
@@ -134,15 +133,9 @@ class Rig:
         self.steps = math.ceil(parameters.sample_time / _LONGEST_STEP - 1e-9)
         step = parameters.sample_time / self.steps
         self.stage = stage_arrays(_plant(parameters, step))
-        self.arrays = RigArrays(
-            settings=_settings(parameters, step),
-            gain=np.array(self.wiring.gain) * np.array(self.wiring.phase_sign),
-            offset=np.array(self.wiring.offset),
-            current=np.zeros(12),
-            impact=np.zeros(1),
-        )
+        self.arrays = _rig_arrays(parameters, step)
         self._total = np.zeros(6, dtype=np.int64)
-        count(self.arrays, self.stage, self._total)
+        count(self.arrays.block, self.stage.block, self._total)
         direction = np.array(self.wiring.encoder_direction, dtype=np.int64)
         self._start = np.array(self.wiring.encoder_start) - direction * self._total
         self._direction = direction
@@ -156,23 +149,23 @@ class Rig:
 
     def advance(self, volts: FloatArray) -> None:
         """One sample with ``volts`` (12,) by phase held."""
-        advance_rig(self.arrays, self.stage, volts, self.steps)
+        advance_rig(self.arrays.block, self.stage.block, volts, self.steps)
 
     def counts(self) -> NDArray[np.int64]:
         """What the six counters stand at, before roll-over, shape (6,)."""
-        count(self.arrays, self.stage, self._total)
+        count(self.arrays.block, self.stage.block, self._total)
         counts: NDArray[np.int64] = self._start + self._direction * self._total
         return counts
 
     @property
     def state(self) -> FloatArray:
         """True x1..x10, shape (10,), a copy."""
-        return np.array(self.stage.memory[STATE : STATE + 10])
+        return np.array(self.stage.state)
 
     def place(self, position: FloatArray, velocity: FloatArray | None = None) -> None:
         """Put the platen somewhere, as by hand: (5,) each [m, rad] and per second."""
-        self.stage.memory[STATE : STATE + 10 : 2] = position
-        self.stage.memory[STATE + 1 : STATE + 10 : 2] = 0.0 if velocity is None else velocity
+        self.stage.state[::2] = position
+        self.stage.state[1::2] = 0.0 if velocity is None else velocity
 
     @property
     def phase_current(self) -> FloatArray:
@@ -182,11 +175,11 @@ class Rig:
     @property
     def impact(self) -> float:
         """Greatest speed at which a seat met a vertical stop so far [m/s]."""
-        return float(self.arrays.impact[0])
+        return self.arrays.impact
 
     def forget_impact(self) -> None:
         """Begin to look for the greatest impact anew."""
-        self.arrays.impact[0] = 0.0
+        self.arrays.impact = 0.0
 
 
 def _plant(parameters: BridgeParameters, step: float) -> PlantParameters:
@@ -197,8 +190,7 @@ def _plant(parameters: BridgeParameters, step: float) -> PlantParameters:
         substeps=1,
         seed=emulation.seed,
         machine=parameters.machine,
-        amplifier=dataclasses.replace(
-            AmplifierParameters(),
+        amplifier=AmplifierParameters(
             bandwidth=0.0,
             peak_current=1e6,
             continuous_current=1e6,
@@ -213,19 +205,22 @@ def _plant(parameters: BridgeParameters, step: float) -> PlantParameters:
     )
 
 
-def _settings(parameters: BridgeParameters, step: float) -> FloatArray:
-    winding, encoder = parameters.emulation.winding, parameters.emulation.encoder
-    settings = np.zeros(SETTINGS)
-    settings[DECAY] = math.exp(-2.0 * math.pi * winding.bandwidth * step)
-    settings[VOLTAGE_DECAY] = math.exp(-winding.resistance / winding.inductance * step)
-    settings[SHORT_CURRENT] = winding.voltage / winding.resistance
-    settings[PEAK] = winding.peak_current
-    settings[WAVE] = math.pi / parameters.machine.pole_pitch
-    settings[SCALE] = SCALES[parameters.commutation.dq_scaling]
-    settings[GAP_COUNT] = encoder.gap_resolution
-    settings[HORIZONTAL_COUNT] = encoder.horizontal_resolution
-    settings[UPPER_STOP] = parameters.machine.gap_min
-    settings[LOWER_STOP] = parameters.machine.gap_max
-    settings[SEAT_RADIUS] = parameters.emulation.stop.seat_radius
-    settings[ANGLE : ANGLE + 4] = parameters.emulation.wiring.angle
-    return settings
+def _rig_arrays(parameters: BridgeParameters, step: float) -> RigArrays:
+    emulation, machine = parameters.emulation, parameters.machine
+    winding, wiring = emulation.winding, emulation.wiring
+    return RigArrays(
+        decay=math.exp(-2.0 * math.pi * winding.bandwidth * step),
+        voltage_decay=math.exp(-winding.resistance / winding.inductance * step),
+        short_current=winding.voltage / winding.resistance,
+        peak=winding.peak_current,
+        wave=math.pi / machine.pole_pitch,
+        scale=SCALES[parameters.commutation.dq_scaling],
+        angle=wiring.angle,
+        gain=np.array(wiring.gain) * np.array(wiring.phase_sign),
+        offset=wiring.offset,
+        gap_count=emulation.encoder.gap_resolution,
+        horizontal_count=emulation.encoder.horizontal_resolution,
+        upper_stop=machine.gap_min,
+        lower_stop=machine.gap_max,
+        seat_radius=emulation.stop.seat_radius,
+    )

@@ -61,7 +61,7 @@ class CommutationParameters:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class EncoderParameters:
+class EncoderInputParameters:
     """Where each encoder is connected, what a count is worth, and which way it counts."""
 
     board: tuple[int, ...] = parameter(
@@ -141,7 +141,7 @@ class HomingParameters:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class AmplifierParameters:
+class DriveParameters:
     """Twelve current amplifiers: volts = sign * current / gain + offset."""
 
     board: tuple[int, ...] = parameter(

@@ -7,22 +7,23 @@ current is cut. Either is latched until :meth:`reset`.
 
 from __future__ import annotations
 
+import contextlib
 import enum
 import time
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from maglev_hw_bridge import amplifiers, guard
+from maglev_hw_bridge import amplifiers, faults, guard
 from maglev_hw_bridge.amplifiers import Amplifiers
-from maglev_hw_bridge.drivers import Driver, DriverError, WatchdogError, make_driver
+from maglev_hw_bridge.drivers import Driver, DriverError, Truthful, WatchdogError, make_driver
 from maglev_hw_bridge.encoders import Encoders, HomingError
-from maglev_hw_bridge.faults import Fault, command_fault, encoder_fault, range_fault
 from maglev_hw_bridge.guard import Guard
-from maglev_hw_bridge.landing import Landing, impact_of_cut
+from maglev_hw_bridge.landing import Landing
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_model.stage import EncoderSample, StageError, motor_currents
+from maglev_model.stage import EncoderSample, Fault, StageError, Truth, motor_currents
 
 FloatArray = NDArray[np.float64]
 
@@ -41,12 +42,10 @@ class Mode(enum.Enum):
 
 
 class BridgeStage:
-    """The stage on boards, one sample per :meth:`read`; needs no ROS.
+    """The :class:`~maglev_model.stage.Stage` on boards, one sample per :meth:`read`."""
 
-    :meth:`configure`, :meth:`activate`; then per sample :meth:`read` and one of :meth:`write` and
-    :meth:`hold`; :meth:`land` and go on until ``mode`` is DISABLED, :meth:`deactivate`,
-    :meth:`close`. :attr:`fault` is what is latched.
-    """
+    paced = True
+    restartable = True
 
     def __init__(
         self,
@@ -57,6 +56,7 @@ class BridgeStage:
     ) -> None:
         """Raises StageError when the driver is not there, ParameterError when there is none."""
         self.parameters = parameters or BridgeParameters()
+        self.sample_time = self.parameters.sample_time
         self.realtime = realtime
         self.mode = Mode.CLOSED
         self.fault: Fault | None = None
@@ -66,6 +66,7 @@ class BridgeStage:
             self.driver = driver or make_driver(self.parameters, realtime)
         except DriverError as error:
             raise StageError(str(error)) from error
+        self._all_knowing = self.driver if isinstance(self.driver, Truthful) else None
         self.encoders = Encoders(self.parameters)
         self.amplifiers = Amplifiers(self.parameters)
         self.guard = Guard(self.parameters)
@@ -73,11 +74,19 @@ class BridgeStage:
         self._counts = np.zeros(6, dtype=np.int32)
         self._zero = np.zeros(4)
         self._direct, self._quadrature = np.zeros(4), np.zeros(4)
-        self._flying = False
+        self.flying = False  # current flows
         self._age = 0  # samples since the last fresh currents
         self._lower_stop = self.parameters.machine.gap_max
         self._stale_samples = round(self.parameters.fault.stale / self.parameters.sample_time)
         self._warm_up()
+
+    @classmethod
+    def ready(cls, parameters: BridgeParameters, *, realtime: bool = False) -> BridgeStage:
+        """A stage that is configured and active. Raises StageError, ParameterError."""
+        stage = cls(parameters, realtime=realtime)
+        stage.configure()
+        stage.activate()
+        return stage
 
     def _warm_up(self) -> None:
         """Compile, or load what was compiled, before a sample asks for it."""
@@ -87,7 +96,7 @@ class BridgeStage:
         self.landing.step(self.guard.arrays.position, rate)
         self.encoders.decode(self._counts)
         self.amplifiers.drive(self._zero, self._zero, 0.0, 0.0)
-        impact_of_cut(self.parameters, y - 1e-4, 0.0)
+        faults.consequence_of_cut(self.parameters, self.guard)
         self.guard.forget()
 
     # -- states ------------------------------------------------------------------------------------
@@ -114,14 +123,11 @@ class BridgeStage:
         if self.mode is not Mode.READY:
             raise StageError(f'cannot be activated: {self.mode.value}')
         self._check_encoders()
-        try:
+        with self._or_drop_boards():
             self.driver.start()
-        except DriverError as error:
-            self._drop_boards()
-            raise StageError(str(error)) from error
         self.amplifiers.cut()
         self.guard.forget()
-        self._flying, self._age = False, 0
+        self.flying, self._age = False, 0
         self.mode = Mode.FOLLOWING if self.fault is None else Mode.DISABLED
 
     def _check_encoders(self) -> None:
@@ -137,17 +143,14 @@ class BridgeStage:
         if self.mode not in (Mode.FOLLOWING, Mode.LANDING, Mode.DISABLED):
             return
         self.amplifiers.cut()
-        self._flying = False
-        try:
+        self.flying = False
+        with self._or_drop_boards():
             self.driver.stop()
-        except DriverError as error:
-            self._drop_boards()
-            raise StageError(str(error)) from error
         self.mode = Mode.READY
 
     def close(self) -> None:
         """Release the boards with outputs at 0 V; may be called twice."""
-        self._flying = False
+        self.flying = False
         if self.mode is not Mode.CLOSED:
             self.mode = Mode.CLOSED
             self.amplifiers.cut()
@@ -170,18 +173,23 @@ class BridgeStage:
         return shift
 
     def _peek(self, counts: NDArray[np.int32]) -> None:
-        try:
+        with self._or_drop_boards():
             self.driver.counts(counts)
-        except DriverError as error:
-            self._drop_boards()
-            raise StageError(str(error)) from error
 
     # -- samples -----------------------------------------------------------------------------------
 
     @property
-    def flying(self) -> bool:
-        """Whether current flows."""
-        return self._flying
+    def late(self) -> float:
+        """How late the sample read last was, by the boards' clock [s]."""
+        return self.driver.late
+
+    def truth(self) -> Truth | None:
+        """The true state of the sample read last; None unless the boards are emulated."""
+        if self._all_knowing is None:
+            return None
+        state, current = self._all_knowing.truth()
+        load: FloatArray = self.amplifiers.arrays.load.reshape(4, 3).max(axis=1)
+        return Truth(state, current[:4], current[4:], load)
 
     def read(self) -> EncoderSample:
         """The next sample; waits for the boards' clock. Raises StageError when they are lost."""
@@ -192,7 +200,7 @@ class BridgeStage:
         except DriverError as error:
             raise self._lose_boards(error) from error
         length = self.encoders.decode(self._counts)
-        code, index = self.guard.watch(length, self._flying)
+        code, index = self.guard.watch(length, self.flying)
         if code != guard.FINE:
             self._sensing_fault(code, index)
         if self.driver.stop_pressed:
@@ -223,13 +231,8 @@ class BridgeStage:
         """No fresh currents for this sample: the last ones stay, for a while. Raises StageError."""
         self._age += 1
         if self.mode is Mode.FOLLOWING:
-            if self._flying and self._age >= self._stale_samples:
-                period = self.parameters.sample_time
-                self._raise_fault(
-                    'stale',
-                    f'no fresh currents for {self._age * period * 1e3:.0f} ms',
-                    'start the controller again',
-                )
+            if self.flying and self._age >= self._stale_samples:
+                self._raise_fault('stale', *faults.stale_fault(self._age * self.sample_time))
             else:
                 self._follow(self._direct, self._quadrature)
         self._put_out()
@@ -241,10 +244,10 @@ class BridgeStage:
         if code in (amplifiers.FINE, amplifiers.SPENT):
             self._direct[:], self._quadrature[:] = i_d, i_q
             self.guard.arrays.i_q[:] = i_q
-            self._flying = bool(np.any(i_d) or np.any(i_q))
+            self.flying = bool(np.any(i_d) or np.any(i_q))
         if code == amplifiers.FINE:
             return ''
-        reason, remedy = command_fault(code, index, i_d, i_q, self.amplifiers)
+        reason, remedy = faults.command_fault(code, index, i_d, i_q, self.amplifiers)
         self._raise_fault('current', reason, remedy)
         return '' if code == amplifiers.SPENT else reason
 
@@ -279,9 +282,9 @@ class BridgeStage:
             self.why = why
             self._begin_landing()
 
-    def stop(self) -> None:
-        """The emergency stop: lands while everything needed for that is sound."""
-        self._raise_fault('stop', 'emergency stop', 'see to what made it necessary')
+    def stop(self, why: str = 'emergency stop') -> None:
+        """Latch a fault with that reason; lands while everything needed for that is sound."""
+        self._raise_fault('stop', why, 'see to what made it necessary')
 
     def resume(self) -> None:
         """Follow the controller again after a landing without a fault."""
@@ -296,7 +299,13 @@ class BridgeStage:
             return resumed, 'follows the controller again' if resumed else 'there is no fault'
         if self.mode is Mode.LANDING:
             return False, 'still landing: reset when the platen rests'
-        remaining = self._restart() if self.mode is Mode.LOST else self._remaining()
+        if self.mode is Mode.LOST:
+            remaining = self._restart()
+        else:
+            pressed = self.driver.stop_pressed
+            remaining = faults.remaining_cause(
+                self.parameters, pressed, self.guard, self.amplifiers
+            )
         if remaining:
             return False, f'the cause is still there: {remaining}'
         cleared, self.fault = self.fault, None
@@ -304,16 +313,6 @@ class BridgeStage:
         self.guard.forget()
         self.resume()
         return True, f'cleared: {cleared.reason}'
-
-    def _remaining(self) -> str:
-        """What still speaks against clearing the fault."""
-        if self.driver.stop_pressed:
-            return 'the emergency stop is pressed'
-        if abs(self.guard.residual) > self.parameters.fault.residual:
-            return f'g1 + g3 - g2 - g4 is {self.guard.residual * 1e6:.0f} um: home again'
-        if self.amplifiers.load > self.parameters.amplifier.derate_load:
-            return f'the amplifiers are hot, I2t load {self.amplifiers.load:.2f}: let them cool'
-        return ''
 
     def _restart(self) -> str:
         """Bring lost boards back: closed, opened, checked, started; what went wrong."""
@@ -336,8 +335,8 @@ class BridgeStage:
     def _raise_fault(self, kind: str, reason: str, remedy: str, cut: bool = False) -> None:
         if self.fault is not None and not (cut and self.mode is Mode.LANDING):
             return
-        if cut and self._flying:
-            reason += self._consequence()
+        if cut and self.flying:
+            reason += faults.consequence_of_cut(self.parameters, self.guard)
         self.fault = Fault(kind, reason, remedy, cut)
         self.why = kind
         if cut:
@@ -345,15 +344,10 @@ class BridgeStage:
         elif self.mode is Mode.FOLLOWING:
             self._begin_landing()
 
-    def _consequence(self) -> str:
-        state = self.guard.arrays
-        speed, stop = impact_of_cut(self.parameters, state.position[0], state.rate[0])
-        return f'; the platen strikes the {stop} stop at about {speed:.2f} m/s'
-
     def _begin_landing(self) -> None:
         state = self.guard.arrays
         resting = state.position[0] > self._lower_stop - _ON_THE_STOP
-        if not self._flying or (resting and abs(state.rate[0]) < 0.02):
+        if not self.flying or (resting and abs(state.rate[0]) < 0.02):
             self._disable()
             return
         self.mode = Mode.LANDING
@@ -361,7 +355,7 @@ class BridgeStage:
 
     def _disable(self) -> None:
         self.mode = Mode.DISABLED
-        self._flying = False
+        self.flying = False
         self._direct[:] = self._quadrature[:] = 0.0
         self.amplifiers.cut()
 
@@ -369,19 +363,17 @@ class BridgeStage:
         if code in (guard.RANGE, guard.GAP_RANGE):
             if self.mode is Mode.LANDING:  # is on its way out of there
                 return
-            self._raise_fault('range', *range_fault(code, index, self.guard))
+            self._raise_fault('range', *faults.range_fault(code, index, self.guard))
         else:
             unsound = not self.guard.mended
-            self._raise_fault('encoder', *encoder_fault(code, index, self.guard), cut=unsound)
+            self._raise_fault(
+                'encoder', *faults.encoder_fault(code, index, self.guard), cut=unsound
+            )
 
     def _late(self) -> None:
         self.late_ticks += 1
-        if self._flying and self.driver.late > self.parameters.boards.overrun:
-            self._raise_fault(
-                'overrun',
-                f'a sample was read {self.driver.late * 1e3:.1f} ms late',
-                'free the machine of other load',
-            )
+        if self.flying and self.driver.late > self.parameters.boards.overrun:
+            self._raise_fault('overrun', *faults.overrun_fault(self.driver.late))
 
     def _lose_boards(self, error: DriverError) -> StageError:
         kind = 'watchdog' if isinstance(error, WatchdogError) else 'board'
@@ -389,7 +381,16 @@ class BridgeStage:
         self._drop_boards()
         return StageError(str(error))
 
+    @contextlib.contextmanager
+    def _or_drop_boards(self) -> Iterator[None]:
+        """Where the boards fail outside of a sample they are given up. Raises StageError."""
+        try:
+            yield
+        except DriverError as error:
+            self._drop_boards()
+            raise StageError(str(error)) from error
+
     def _drop_boards(self) -> None:
         self.driver.close()
         self.mode = Mode.LOST
-        self._flying = False
+        self.flying = False

@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import NamedTuple
+from typing import Annotated, Final, NamedTuple
 
 import numpy as np
+from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
 from maglev_model.compiled import compiled
@@ -225,38 +226,18 @@ def machine_constants(parameters: MachineParameters) -> Machine:
     )
 
 
+FIELDS: Final = len(Machine._fields)
+
+MachineArray = Annotated[NDArray[np.float64], FIELDS]
+"""A field of a record that holds the constants."""
+
+
 def machine_to_array(machine: Machine) -> NDArray[np.float64]:
     """The constants in one array, shape (25,), for :func:`machine_from_array`."""
     return np.array(machine, dtype=np.float64)
 
 
 @compiled
-def machine_from_array(m: NDArray[np.float64]) -> Machine:
+def machine_from_array(array: NDArray[np.float64]) -> Machine:
     """The :class:`Machine` in an array; an array is the cheaper argument for calls from Python."""
-    return Machine(
-        m[0],
-        m[1],
-        m[2],
-        m[3],
-        m[4],
-        m[5],
-        m[6],
-        m[7],
-        m[8],
-        m[9],
-        m[10],
-        m[11],
-        m[12],
-        m[13],
-        m[14],
-        m[15],
-        m[16],
-        m[17],
-        m[18],
-        m[19],
-        m[20],
-        m[21],
-        m[22],
-        m[23],
-        m[24],
-    )
+    return Machine(*to_fixed_tuple(array, FIELDS))

@@ -18,23 +18,119 @@ class EncoderSample(NamedTuple):
     z: float  # displacement along Z [m]
 
 
+class Truth(NamedTuple):
+    """What is behind a sample, where the stage knows it: a simulated one does."""
+
+    state: FloatArray  # x1..x10 [m, m/s, rad, rad/s], shape (10,)
+    direct_current: FloatArray  # i_d flowing in motors 1..4 [A], shape (4,)
+    quadrature_current: FloatArray  # i_q flowing in motors 1..4 [A], shape (4,)
+    thermal_load: FloatArray  # used share of the budget of each motor's hottest phase, shape (4,)
+
+
+class Fault(NamedTuple):
+    """A latched fault."""
+
+    kind: str  # a word
+    reason: str  # what happened
+    remedy: str  # what to do
+    cut: bool  # whether the current was cut at once
+
+    def __str__(self) -> str:
+        action = 'currents cut' if self.cut else 'landed by the stage'
+        return f'{self.reason} ({action}); {self.remedy}, then call ~/reset'
+
+
 class StageError(RuntimeError):
     """The stage cannot go on; the message says why and what to do."""
 
 
 class Stage(Protocol):
-    """A stage that is read and written once a sample."""
+    """A stage: encoders to read and motors to give currents to, once a sample.
+
+    :meth:`configure` and :meth:`activate` it; then per sample :meth:`read` and one of :meth:`write`
+    and :meth:`hold`; to end, :meth:`land` and go on with :meth:`hold` until it is not
+    :attr:`flying`, :meth:`deactivate`, :meth:`close`. Deactivated, it can be activated again.
+    """
+
+    @property
+    def sample_time(self) -> float:
+        """Time between samples [s]."""
+        ...
+
+    @property
+    def paced(self) -> bool:
+        """Whether, in real time, :meth:`read` waits for a clock of the stage's own."""
+        ...
+
+    @property
+    def restartable(self) -> bool:
+        """Whether :meth:`reset` can bring back a stage that cannot go on."""
+        ...
+
+    @property
+    def late(self) -> float:
+        """How late the sample read last was, by the stage's own clock [s]."""
+        ...
+
+    @property
+    def flying(self) -> bool:
+        """Whether currents flow, or are to."""
+        ...
+
+    @property
+    def fault(self) -> Fault | None:
+        """What is latched until :meth:`reset`; meanwhile no currents are followed."""
+        ...
+
+    def configure(self) -> None:
+        """Get hold of the hardware, with no current flowing. Raises StageError."""
+        ...
+
+    def activate(self) -> None:
+        """Be ready for the first sample and follow currents. Raises StageError."""
+        ...
 
     def read(self) -> EncoderSample:
-        """The next sample's encoders; a real stage waits for its clock. Raises StageError."""
+        """The next sample's encoders. Raises StageError."""
         ...
 
     def write(self, direct_current: FloatArray, quadrature_current: FloatArray) -> None:
-        """Command i_d and i_q of motors 1..4 [A], held until the next write. Raises StageError."""
+        """Follow i_d and i_q of motors 1..4 [A], (4,) each, fresh from the controller.
+
+        Raises ValueError for currents that have another shape or are not finite, which are not
+        followed, and StageError.
+        """
+        ...
+
+    def hold(self) -> None:
+        """No fresh currents came for this sample: the last ones stay, for a while.
+
+        In flight that is a fault when it lasts too long. Raises StageError.
+        """
+        ...
+
+    def land(self, why: str) -> None:
+        """Come down without a controller and follow no currents until :meth:`reset`."""
+        ...
+
+    def stop(self, why: str = 'emergency stop') -> None:
+        """Latch a fault with that reason, and land or cut the currents, as the stage can."""
+        ...
+
+    def reset(self) -> tuple[bool, str]:
+        """Clear the fault if its cause is gone, and follow currents again; whether, and a text."""
+        ...
+
+    def deactivate(self) -> None:
+        """No current; may be activated again. Raises StageError."""
         ...
 
     def close(self) -> None:
         """Release everything with no current flowing; may be called twice."""
+        ...
+
+    def truth(self) -> Truth | None:
+        """The true state of the sample read last, or None where it cannot be known."""
         ...
 
 

@@ -1,76 +1,72 @@
-"""The simulated stage as flat arrays, which compiled functions take quickly from Python.
-
-``scalars`` begins with the :class:`~maglev_model.machine.Machine` of the true plant; ``axes`` holds
-what exists once per axis; ``memory`` is everything that changes with time.
-"""
+"""The simulated stage in one record: the true machine, constants, and what changes with time."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from typing import Final, NamedTuple
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from maglev_model.axes import FloatArray
 from maglev_model.commutation import SCALES
-from maglev_model.machine import Machine, machine_constants
+from maglev_model.machine import Machine, MachineArray, machine_constants
+from maglev_model.records import Record
 from maglev_plant.parameters import PlantParameters
 
-FloatArray = NDArray[np.float64]
 
-# Indices into scalars, after the machine.
-STEP: Final = len(Machine._fields)  # integration step [s]
-SUBSTEPS: Final = STEP + 1
-LAG_START: Final = STEP + 2  # share of a current's lag at the start of a step, see _lag
-LAG_MIDDLE: Final = STEP + 3  # in its middle
-LAG_END: Final = STEP + 4  # left at its end; 0 without lag
-PEAK: Final = STEP + 5  # [A]
-CONTINUOUS: Final = STEP + 6  # [A]
-THERMAL_GAIN: Final = STEP + 7  # 1 - exp(-sample time / thermal time)
-THERMAL_RECOVERY: Final = STEP + 8
-DQ_SCALE: Final = STEP + 9
-GAP_RESOLUTION: Final = STEP + 10  # [m]
-HORIZONTAL_RESOLUTION: Final = STEP + 11
-GAP_NOISE: Final = STEP + 12
-HORIZONTAL_NOISE: Final = STEP + 13
-SEED: Final = STEP + 14
-SEAT_RADIUS: Final = STEP + 15  # [m]
-GYRATION: Final = STEP + 16  # √(I_x / M_y) [m]
-SINUSOIDS: Final = STEP + 17  # 1 when some disturbance is a sinusoid
-SCALARS: Final = STEP + 18
+class StageArrays(Record):
+    """What ``dynamics.advance`` and ``encoder.encode`` take; its block is all there is of a stage.
 
-# Rows of axes.
-COULOMB: Final = 0  # [m/s², rad/s²]
-COULOMB_VELOCITY: Final = 1  # [m/s, rad/s]
-VISCOUS: Final = 2  # [1/s]
-CONSTANT: Final = 3  # disturbance [m/s², rad/s²]
-AMPLITUDE: Final = 4
-ANGULAR_FREQUENCY: Final = 5  # [rad/s]
-PHASE: Final = 6  # [rad]
-LOWER: Final = 7  # stops [m, rad]
-UPPER: Final = 8
-LOCKED: Final = 9  # 1 when locked
-ROWS: Final = 10
+    Axes are y, x, z, phi, theta; currents i_d of motors 1..4, then i_q; phases a, b, c of motor 1,
+    then 2, 3, 4.
+    """
 
-# Slices of memory, by their first index.
-STATE: Final = 0  # x1..x10
-FLOWING: Final = 10  # i_d of motors 1..4, then i_q [A]
-TARGET: Final = 18  # what the amplifiers aim at, in the same order [A]
-LOAD: Final = 26  # thermal load of phases a, b, c of motor 1, then 2, 3, 4
-LIMITED: Final = 38  # 1 where that phase has spent its budget
-SAMPLE: Final = 50  # number of samples so far
-MEMORY: Final = 51
+    machine: MachineArray  # the true one
 
+    step: float  # of integration [s]
+    substeps: int  # per sample
+    lag_start: float  # share of a current's lag at the start of a step, see _lag
+    lag_middle: float  # in its middle
+    lag_end: float  # left at its end; 0 without lag
 
-class StageArrays(NamedTuple):
-    """What ``dynamics.advance`` and ``encoder.encode`` take."""
+    peak: float  # of a phase [A]
+    continuous: float  # [A]
+    thermal_gain: float  # 1 - exp(-sample time / thermal time)
+    thermal_recovery: float  # load
+    dq_scale: float
 
-    scalars: FloatArray  # (SCALARS,)
-    axes: FloatArray  # (ROWS, 5)
-    memory: FloatArray  # (MEMORY,)
-    command: FloatArray  # (8,): i_d of motors 1..4, then i_q [A]
-    reading: FloatArray  # (6,): gaps of motors 1..4, x, z [m]
+    gap_resolution: float  # [m]
+    horizontal_resolution: float
+    gap_noise: float
+    horizontal_noise: float
+    seed: int
+
+    coulomb: Annotated[FloatArray, 5]  # friction [m/s², rad/s²]
+    coulomb_velocity: Annotated[FloatArray, 5]  # [m/s, rad/s]
+    viscous: Annotated[FloatArray, 5]  # [1/s]
+    locked: Annotated[NDArray[np.int8], 5]  # 1: locked
+    constant: Annotated[FloatArray, 5]  # disturbance [m/s², rad/s²]
+    amplitude: Annotated[FloatArray, 5]
+    angular_frequency: Annotated[FloatArray, 5]  # [rad/s]
+    phase: Annotated[FloatArray, 5]  # [rad]
+    sinusoids: bool  # whether some disturbance is one
+
+    lower: Annotated[FloatArray, 5]  # stops [m, rad]
+    upper: Annotated[FloatArray, 5]
+    seat_radius: float  # [m]
+    gyration: float  # √(I_x / M_y) [m]
+
+    sample: int  # number of samples so far
+    state: Annotated[FloatArray, 10]  # x1..x10
+    flowing: Annotated[FloatArray, 8]  # currents [A]
+    target: Annotated[FloatArray, 8]  # what the amplifiers aim at [A]
+    load: Annotated[FloatArray, 12]  # thermal load by phase
+    limited: Annotated[NDArray[np.int8], 12]  # 1 where that phase has spent its budget
+
+    command: Annotated[FloatArray, 8]  # currents [A]
+    reading: Annotated[FloatArray, 6]  # gaps of motors 1..4, x, z [m]
 
 
 def true_machine(parameters: PlantParameters) -> Machine:
@@ -102,48 +98,35 @@ def true_machine(parameters: PlantParameters) -> Machine:
 
 
 def stage_arrays(parameters: PlantParameters) -> StageArrays:
-    """The arrays of a stage at its initial state, without current."""
+    """A stage at its initial state, without current, amplifiers cold."""
     machine = true_machine(parameters)
-    return StageArrays(
-        scalars=_scalars(parameters, machine),
-        axes=_axes(parameters, machine),
-        memory=initial_memory(parameters),
-        command=np.zeros(8),
-        reading=np.zeros(6),
+    stage = StageArrays(
+        machine=machine,
+        seat_radius=parameters.stop.seat_radius,
+        gyration=math.sqrt(machine.I_x / machine.M_y),
+        lower=parameters.machine.lower_limit,
+        upper=parameters.machine.upper_limit,
+        **_integration(parameters),
+        **_amplifiers(parameters),
+        **_encoders(parameters),
+        **_guides(parameters),
+        **_disturbances(parameters, machine),
     )
+    stage.state[::2] = parameters.initial.position
+    stage.state[1::2] = np.array(parameters.initial.velocity) * np.logical_not(stage.locked)
+    return stage
 
 
-def initial_memory(parameters: PlantParameters) -> FloatArray:
-    """``memory`` at the initial state, without current, amplifiers cold."""
-    memory = np.zeros(MEMORY)
-    memory[STATE : STATE + 10 : 2] = parameters.initial.position
-    free = np.logical_not(parameters.guide.locked)
-    memory[STATE + 1 : STATE + 10 : 2] = np.array(parameters.initial.velocity) * free
-    return memory
-
-
-def _scalars(parameters: PlantParameters, machine: Machine) -> FloatArray:
-    amplifier, encoder = parameters.amplifier, parameters.encoder
+def _integration(parameters: PlantParameters) -> dict[str, Any]:
     step = parameters.sample_time / parameters.substeps
-    scalars = np.zeros(SCALARS)
-    scalars[:STEP] = machine
-    scalars[STEP] = step
-    scalars[SUBSTEPS] = parameters.substeps
-    scalars[LAG_START : LAG_END + 1] = _lag(2.0 * math.pi * amplifier.bandwidth * step)
-    scalars[PEAK] = amplifier.peak_current
-    scalars[CONTINUOUS] = amplifier.continuous_current
-    scalars[THERMAL_GAIN] = -math.expm1(-parameters.sample_time / amplifier.thermal_time)
-    scalars[THERMAL_RECOVERY] = amplifier.thermal_recovery
-    scalars[DQ_SCALE] = SCALES[amplifier.dq_scaling]
-    scalars[GAP_RESOLUTION] = encoder.gap_resolution
-    scalars[HORIZONTAL_RESOLUTION] = encoder.horizontal_resolution
-    scalars[GAP_NOISE] = encoder.gap_noise
-    scalars[HORIZONTAL_NOISE] = encoder.horizontal_noise
-    scalars[SEED] = parameters.seed
-    scalars[SEAT_RADIUS] = parameters.stop.seat_radius
-    scalars[GYRATION] = math.sqrt(machine.I_x / machine.M_y)
-    scalars[SINUSOIDS] = float(any(parameters.disturbance.amplitude))
-    return scalars
+    start, middle, end = _lag(2.0 * math.pi * parameters.amplifier.bandwidth * step)
+    return {
+        'step': step,
+        'substeps': parameters.substeps,
+        'lag_start': start,
+        'lag_middle': middle,
+        'lag_end': end,
+    }
 
 
 def _lag(steps: float) -> tuple[float, float, float]:
@@ -164,18 +147,32 @@ def _lag(steps: float) -> tuple[float, float, float]:
     return 6.0 * moment - 2.0 * middle, middle, end
 
 
-def _axes(parameters: PlantParameters, machine: Machine) -> FloatArray:
-    guide, disturbance = parameters.guide, parameters.disturbance
+def _amplifiers(parameters: PlantParameters) -> dict[str, Any]:
+    amplifier = parameters.amplifier
+    return {
+        'peak': amplifier.peak_current,
+        'continuous': amplifier.continuous_current,
+        'thermal_gain': -math.expm1(-parameters.sample_time / amplifier.thermal_time),
+        'thermal_recovery': amplifier.thermal_recovery,
+        'dq_scale': SCALES[amplifier.dq_scaling],
+    }
+
+
+def _encoders(parameters: PlantParameters) -> dict[str, Any]:
+    return {**dataclasses.asdict(parameters.encoder), 'seed': parameters.seed}
+
+
+def _guides(parameters: PlantParameters) -> dict[str, Any]:
+    return dataclasses.asdict(parameters.guide)
+
+
+def _disturbances(parameters: PlantParameters, machine: Machine) -> dict[str, Any]:
+    disturbance = parameters.disturbance
     mass = np.array([machine.M_y, machine.M_x, machine.M_z, machine.I_x, machine.I_x])
-    axes = np.zeros((ROWS, 5))
-    axes[COULOMB] = guide.coulomb
-    axes[COULOMB_VELOCITY] = guide.coulomb_velocity
-    axes[VISCOUS] = guide.viscous
-    axes[CONSTANT] = np.array(disturbance.constant) / mass
-    axes[AMPLITUDE] = np.array(disturbance.amplitude) / mass
-    axes[ANGULAR_FREQUENCY] = 2.0 * math.pi * np.array(disturbance.frequency)
-    axes[PHASE] = disturbance.phase
-    axes[LOWER] = parameters.machine.lower_limit
-    axes[UPPER] = parameters.machine.upper_limit
-    axes[LOCKED] = guide.locked
-    return axes
+    return {
+        'constant': np.array(disturbance.constant) / mass,
+        'amplitude': np.array(disturbance.amplitude) / mass,
+        'angular_frequency': 2.0 * math.pi * np.array(disturbance.frequency),
+        'phase': disturbance.phase,
+        'sinusoids': any(disturbance.amplitude),
+    }

@@ -11,16 +11,8 @@ import numpy as np
 
 from maglev_model.compiled import compiled
 from maglev_model.machine import machine_from_array
-from maglev_plant.arrays import (
-    GAP_NOISE,
-    GAP_RESOLUTION,
-    HORIZONTAL_NOISE,
-    HORIZONTAL_RESOLUTION,
-    SAMPLE,
-    SEED,
-    STATE,
-    FloatArray,
-)
+from maglev_model.records import Block
+from maglev_plant.arrays import StageArrays
 
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 _MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
@@ -63,25 +55,20 @@ def _read(
 
 
 @compiled
-def encode(scalars: FloatArray, memory: FloatArray, reading: FloatArray) -> None:
-    """Write what the encoders read now: gaps of motors 1..4, x, z [m], ``reading``, shape (6,)."""
-    machine = machine_from_array(scalars)
-    seed, sample = int(scalars[SEED]), int(memory[SAMPLE])
-    y = memory[STATE]
-    tilt_phi = machine.r * math.sin(memory[STATE + 6])
-    tilt_theta = machine.r * math.sin(memory[STATE + 8])
+def encode(block: Block) -> None:
+    """Write what the encoders read now into ``reading`` of a stage's block."""
+    stage: StageArrays = block[0]
+    machine = machine_from_array(stage.machine)
+    state, reading = stage.state, stage.reading
+    y = state[0]
+    tilt_phi = machine.r * math.sin(state[6])
+    tilt_theta = machine.r * math.sin(state[8])
     reading[0] = y - tilt_phi
     reading[1] = y + tilt_theta
     reading[2] = y + tilt_phi
     reading[3] = y - tilt_theta
-    for i in range(4):
-        reading[i] = _read(reading[i], scalars[GAP_RESOLUTION], scalars[GAP_NOISE], seed, sample, i)
-    for i in range(2):
-        reading[4 + i] = _read(
-            memory[STATE + 2 + 2 * i],
-            scalars[HORIZONTAL_RESOLUTION],
-            scalars[HORIZONTAL_NOISE],
-            seed,
-            sample,
-            4 + i,
-        )
+    reading[4], reading[5] = state[2], state[4]
+    for i in range(6):
+        resolution = stage.gap_resolution if i < 4 else stage.horizontal_resolution
+        noise = stage.gap_noise if i < 4 else stage.horizontal_noise
+        reading[i] = _read(reading[i], resolution, noise, stage.seed, stage.sample, i)

@@ -198,6 +198,13 @@ class PlantParameters:
         2, lower=1, upper=1000, description='Runge-Kutta steps of fourth order per sample'
     )
     seed: int = parameter(0, lower=0, upper=2**31 - 1, description='seed of the encoder noise')
+    watchdog: float = parameter(
+        0.05,
+        unit='s',
+        lower=0.002,
+        upper=1.0,
+        description='without fresh currents for this long in flight they are cut',
+    )
     machine: MachineParameters = group(MachineParameters)
     amplifier: AmplifierParameters = group(AmplifierParameters)
     encoder: EncoderParameters = group(EncoderParameters)

@@ -8,18 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
-from maglev_model.stage import EncoderSample, motor_currents
-from maglev_plant.arrays import (
-    FLOWING,
-    LOAD,
-    SAMPLE,
-    STATE,
-    FloatArray,
-    StageArrays,
-    initial_memory,
-    stage_arrays,
-)
+from maglev_model.records import Block
+from maglev_model.stage import EncoderSample, Fault, Truth, motor_currents
+from maglev_plant.arrays import StageArrays, stage_arrays
 from maglev_plant.dynamics import advance
 from maglev_plant.encoder import encode
 from maglev_plant.parameters import PlantParameters
@@ -38,17 +31,10 @@ class Trajectory(NamedTuple):
 
 
 @compiled
-def _read(
-    scalars: FloatArray,
-    axes: FloatArray,
-    memory: FloatArray,
-    command: FloatArray,
-    reading: FloatArray,
-    first: bool,
-) -> None:
+def _read(block: Block, first: bool) -> None:
     if not first:
-        advance(scalars, axes, memory, command)
-    encode(scalars, memory, reading)
+        advance(block)
+    encode(block)
 
 
 @compiled
@@ -64,17 +50,26 @@ def _hold(i_d: FloatArray, i_q: FloatArray, command: FloatArray) -> bool:
 
 
 class SimulatedStage:
-    """The stage in simulation, one sample per :meth:`read`.
+    """The :class:`~maglev_model.stage.Stage` in simulation, one sample per :meth:`read`.
 
     The first ``read`` gives sample 0 at the initial state. Each further one carries the plant over
     one sample time with the currents last written held, and gives what the encoders read then.
-    Before anything is written no current flows.
+    Before anything is written no current flows. It is ready once it is made.
     """
+
+    late = 0.0
+    paced = False
+    restartable = False
 
     def __init__(self, parameters: PlantParameters | None = None) -> None:
         self.parameters = parameters or PlantParameters()
+        self.sample_time = self.parameters.sample_time
+        self.watchdog = self.parameters.watchdog
+        self.fault: Fault | None = None
         self._arrays = stage_arrays(self.parameters)
         self._first = True
+        self._landed = False
+        self._age = 0  # samples since the last fresh currents
 
     @property
     def arrays(self) -> StageArrays:
@@ -84,39 +79,65 @@ class SimulatedStage:
     @property
     def sequence(self) -> int:
         """Number of the sample the plant stands at."""
-        return int(self._arrays.memory[SAMPLE])
+        return self._arrays.sample
+
+    @property
+    def flying(self) -> bool:
+        """Whether currents are held."""
+        return bool(self._arrays.command.any())
 
     @property
     def state(self) -> FloatArray:
         """True x1..x10 [m, m/s, rad, rad/s], shape (10,), a copy."""
-        return np.array(self._arrays.memory[STATE : STATE + 10])
+        return np.array(self._arrays.state)
 
     @property
     def direct_current(self) -> FloatArray:
         """i_d flowing in motors 1..4 [A], shape (4,), a copy."""
-        return np.array(self._arrays.memory[FLOWING : FLOWING + 4])
+        return np.array(self._arrays.flowing[:4])
 
     @property
     def quadrature_current(self) -> FloatArray:
         """i_q flowing in motors 1..4 [A], shape (4,), a copy."""
-        return np.array(self._arrays.memory[FLOWING + 4 : FLOWING + 8])
+        return np.array(self._arrays.flowing[4:])
 
     @property
     def thermal_load(self) -> FloatArray:
         """Used share of the thermal budget of motors 1..4, each its hottest phase, shape (4,)."""
-        load: FloatArray = self._arrays.memory[LOAD : LOAD + 12].reshape(4, 3).max(axis=1)
+        load: FloatArray = self._arrays.load.reshape(4, 3).max(axis=1)
         return load
+
+    def truth(self) -> Truth:
+        """The true state of the sample the plant stands at."""
+        return Truth(self.state, self.direct_current, self.quadrature_current, self.thermal_load)
+
+    def configure(self) -> None:
+        """Go to sample 0 and the initial state, without current or fault, amplifiers cold.
+
+        Whatever a sample needs is compiled, or loaded, before.
+        """
+        for _ in range(2):
+            self.read()
+            _hold(np.zeros(4), np.zeros(4), self._arrays.command)
+        self._arrays.block[:] = stage_arrays(self.parameters).block
+        self._first = True
+        self.fault = None
+        self.activate()
+
+    def activate(self) -> None:
+        """Follow currents from now on; none flows yet."""
+        self._arrays.command[:] = 0.0
+        self._landed, self._age = False, 0
 
     def read(self) -> EncoderSample:
         """The next sample; see the class."""
-        arrays = self._arrays
-        reading = np.empty(6)
-        _read(arrays.scalars, arrays.axes, arrays.memory, arrays.command, reading, self._first)
+        _read(self._arrays.block, self._first)
+        reading = self._arrays.reading.copy()
         self._first = False
         return EncoderSample(reading[:4], reading.item(4), reading.item(5))
 
     def write(self, direct_current: ArrayLike, quadrature_current: ArrayLike) -> None:
-        """Hold these currents until the next write.
+        """Hold these currents until the next write; none while a fault is latched or it has landed.
 
         ``direct_current`` i_d, ``quadrature_current`` i_q of motors 1..4 [A], shape (4,) each.
         Raises ValueError, and holds what was written before, when a shape is wrong or a current is
@@ -126,16 +147,48 @@ class SimulatedStage:
         i_q = motor_currents(_QUADRATURE, quadrature_current)
         if not _hold(i_d, i_q, self._arrays.command):
             raise ValueError(_not_finite(i_d, i_q))
+        self._age = 0
+        if self._landed or self.fault is not None:
+            self.deactivate()
 
-    def reset(self) -> None:
-        """Go back to sample 0 and the initial state, without current, amplifiers cold."""
-        self._arrays.memory[:] = initial_memory(self.parameters)
+    def hold(self) -> None:
+        """No fresh currents for this sample; a fault when they are older than the watchdog."""
+        self._age += 1
+        age = self._age * self.sample_time
+        if age > self.watchdog and self.flying:
+            self._latch(
+                'stale', f'no fresh currents for {age * 1e3:.0f} ms', 'start the controller again'
+            )
+
+    def land(self, why: str) -> None:
+        """End the currents, for it has no law to land by: what flies drops, whatever ``why``."""
+        self._landed = True
+        self.deactivate()
+
+    def stop(self, why: str = 'emergency stop') -> None:
+        """Cut the currents and latch a fault with that reason."""
+        self._latch('stop', why, 'see to what made it necessary')
+
+    def reset(self) -> tuple[bool, str]:
+        """Clear the latched fault and follow currents again; whether there was need to."""
+        fault, landed = self.fault, self._landed
+        self.fault, self._landed = None, False
+        if fault is not None:
+            return True, f'cleared: {fault.reason}'
+        return landed, 'follows the controller again' if landed else 'there is no fault'
+
+    def deactivate(self) -> None:
+        """Take the currents away."""
         self._arrays.command[:] = 0.0
-        self._first = True
 
     def close(self) -> None:
         """Take the currents away."""
-        self._arrays.command[:] = 0.0
+        self.deactivate()
+
+    def _latch(self, kind: str, reason: str, remedy: str) -> None:
+        if self.fault is None:
+            self.fault = Fault(kind, reason, remedy, cut=True)
+        self.deactivate()
 
 
 def _not_finite(i_d: FloatArray, i_q: FloatArray) -> str:

@@ -19,8 +19,9 @@ from __future__ import annotations
 
 import math
 
+from maglev_model.axes import PHI, THETA, FloatArray, X, Y, Z
 from maglev_model.compiled import compiled
-from maglev_plant.arrays import GYRATION, LOCKED, LOWER, SEAT_RADIUS, STATE, UPPER, FloatArray
+from maglev_plant.arrays import StageArrays
 
 
 @compiled
@@ -55,15 +56,12 @@ def _project_on_seat_one_tilt(depth: float, tilt: float, slope: float) -> tuple[
 
 
 @compiled
-def _seat(
-    scalars: FloatArray, axes: FloatArray, depth: float, phi: float, theta: float
-) -> tuple[float, float, float]:
+def _seat(stage: StageArrays, depth: float, phi: float, theta: float) -> tuple[float, float, float]:
     """Bring y's ``depth`` into a stop [m] and the tilts [rad] to the seats' cone, locks kept."""
-    radius = scalars[SEAT_RADIUS]
-    gyration = scalars[GYRATION]
+    radius, gyration = stage.seat_radius, stage.gyration
     slope = radius / gyration
-    phi_free, theta_free = axes[LOCKED, 3] == 0.0, axes[LOCKED, 4] == 0.0
-    if axes[LOCKED, 0] != 0.0:
+    phi_free, theta_free = not stage.locked[PHI], not stage.locked[THETA]
+    if stage.locked[Y]:
         if radius > 0.0:
             tilt = max(-depth, 0.0) / radius
             phi = min(max(phi, -tilt), tilt) if phi_free else phi
@@ -82,46 +80,40 @@ def _seat(
 
 
 @compiled
-def _clip(axes: FloatArray, axis: int, value: float) -> float:
-    return float(min(max(value, axes[LOWER, axis]), axes[UPPER, axis]))
+def _clip(stage: StageArrays, axis: int, value: float) -> float:
+    return float(min(max(value, stage.lower[axis]), stage.upper[axis]))
 
 
 @compiled
-def apply_stops(
-    scalars: FloatArray, axes: FloatArray, memory: FloatArray, before: FloatArray, step: float
-) -> None:
-    """Correct ``memory`` after a free step of ``step`` [s] from state ``before``, shape (10,)."""
-    for axis in (1, 2):
-        here = STATE + 2 * axis
-        if memory[here] != _clip(axes, axis, memory[here]):
-            start = before[2 * axis]
-            end = _clip(axes, axis, start + step * memory[here + 1])
-            memory[here] = end
-            memory[here + 1] = (end - start) / step
-    y, phi, theta = memory[STATE], memory[STATE + 6], memory[STATE + 8]
-    reach = scalars[SEAT_RADIUS] * max(abs(phi), abs(theta))
+def _arrive(stage: StageArrays, before: FloatArray, axis: int, position: float) -> None:
+    stage.state[2 * axis] = position
+    stage.state[2 * axis + 1] = (position - before[2 * axis]) / stage.step
+
+
+@compiled
+def apply_stops(stage: StageArrays, before: FloatArray) -> None:
+    """Correct the state after a free step from state ``before``, shape (10,)."""
+    state, step = stage.state, stage.step
+    for axis in (X, Z):
+        if state[2 * axis] != _clip(stage, axis, state[2 * axis]):
+            free = before[2 * axis] + step * state[2 * axis + 1]
+            _arrive(stage, before, axis, _clip(stage, axis, free))
+    y, phi, theta = state[0], state[6], state[8]
+    reach = stage.seat_radius * max(abs(phi), abs(theta))
     if (
-        y + reach <= axes[UPPER, 0]
-        and y - reach >= axes[LOWER, 0]
-        and abs(phi) <= axes[UPPER, 3]
-        and abs(theta) <= axes[UPPER, 4]
+        y + reach <= stage.upper[Y]
+        and y - reach >= stage.lower[Y]
+        and abs(phi) <= stage.upper[PHI]
+        and abs(theta) <= stage.upper[THETA]
     ):
         return
-    y = before[0] + step * memory[STATE + 1]
-    phi = _clip(axes, 3, before[6] + step * memory[STATE + 7])
-    theta = _clip(axes, 4, before[8] + step * memory[STATE + 9])
-    depth, phi, theta = _seat(scalars, axes, y - axes[UPPER, 0], phi, theta)
-    y = axes[UPPER, 0] + depth
-    depth, phi, theta = _seat(scalars, axes, axes[LOWER, 0] - y, phi, theta)
-    y = axes[LOWER, 0] - depth
-    _arrive(memory, before, 0, y, step)
-    _arrive(memory, before, 6, phi, step)
-    _arrive(memory, before, 8, theta, step)
-
-
-@compiled
-def _arrive(
-    memory: FloatArray, before: FloatArray, index: int, position: float, step: float
-) -> None:
-    memory[STATE + index] = position
-    memory[STATE + index + 1] = (position - before[index]) / step
+    y = before[0] + step * state[1]
+    phi = _clip(stage, PHI, before[6] + step * state[7])
+    theta = _clip(stage, THETA, before[8] + step * state[9])
+    depth, phi, theta = _seat(stage, y - stage.upper[Y], phi, theta)
+    y = stage.upper[Y] + depth
+    depth, phi, theta = _seat(stage, stage.lower[Y] - y, phi, theta)
+    y = stage.lower[Y] - depth
+    _arrive(stage, before, Y, y)
+    _arrive(stage, before, PHI, phi)
+    _arrive(stage, before, THETA, theta)

@@ -20,8 +20,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from maglev_model.axes import AXES, FloatArray
+from maglev_model.loop_parameters import AxisLoopParameters
 from maglev_reference.currents import friction
-from maglev_reference.model_parameters import InternalModelParameters
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.trajectories import Course, course
 
@@ -29,29 +29,29 @@ _POINTS = 16384  # over one period
 _LONGEST = 120.0  # what is looked at of a course that does not repeat [s]
 _REST = 2.0  # after it, in which the error dies away [s]
 _HELD = 1e-3  # relative difference up to which a frequency counts as held
-_WEAK = 0.05  # harmonics below this share of the largest are not named
+_WEAK = 0.05  # of the largest harmonic; those below it are not named
 _STILL = 1e-9  # amplitude below which an output stands still [m, rad]
 _NAMED = 3
 
 
 def compliance(
-    frequency: FloatArray, held: Sequence[float], model: InternalModelParameters
+    frequency: FloatArray, held: Sequence[float], loop: AxisLoopParameters, sampling: float
 ) -> FloatArray:
     """Error per disturbing acceleration [s^2] at each ``frequency`` (n,) [rad/s].
 
-    ``held`` are the frequencies of the internal model [rad/s], ``model`` gives W, i, m and c.
+    ``held`` are the frequencies of the internal model [rad/s], ``loop`` gives W, i and m,
+    ``sampling`` is c.
     """
     omega = np.asarray(frequency, dtype=float)
-    inverse = (omega**2 + model.bandwidth**2) ** 2
+    stiffness = (omega**2 + loop.bandwidth**2) ** 2
     with np.errstate(divide='ignore'):
         for mode in held:
             if mode > 0.0:
-                share = model.learning**2 * (omega**2 + mode**2) / (omega**2 - mode**2) ** 2
+                learnt = loop.learning**2 * (omega**2 + mode**2) / (omega**2 - mode**2) ** 2
             else:
-                share = model.integration**2 / omega**2
-            inverse = inverse + model.bandwidth**4 * share
-    found: FloatArray = model.sampling / np.sqrt(inverse)
-    return found
+                learnt = loop.integration**2 / omega**2
+            stiffness = stiffness + loop.bandwidth**4 * learnt
+    return np.asarray(sampling / np.sqrt(stiffness))
 
 
 def expected_error(path: Course, parameters: ReferenceParameters) -> FloatArray:
@@ -59,17 +59,18 @@ def expected_error(path: Course, parameters: ReferenceParameters) -> FloatArray:
 
     It is that of a course that has been followed for long; the encoders' resolution comes on top.
     """
-    found = np.empty(5)
-    table = parameters.internal_model
+    expected = np.empty(5)
     length = _span(path, parameters)
     total = length if path.period is not None else length + _REST
     amplitude = disturbance_lines(path, parameters)
     omega = 2.0 * np.pi / total * np.arange(len(amplitude), dtype=np.float64)
-    for axis, held in enumerate(table.frequencies()):
-        error = amplitude[:, axis] * compliance(omega, held, table)
+    sampling = parameters.internal_model.sampling
+    loops = zip(parameters.held_frequencies, parameters.loops, strict=True)
+    for axis, (held, loop) in enumerate(loops):
+        error = amplitude[:, axis] * compliance(omega, held, loop, sampling)
         mean_square = error[0] ** 2 + 0.5 * (error[1:] ** 2).sum()
-        found[axis] = math.sqrt(mean_square * total / length)
-    return found
+        expected[axis] = math.sqrt(mean_square * total / length)
+    return expected
 
 
 def disturbance_lines(path: Course, parameters: ReferenceParameters) -> FloatArray:
@@ -81,12 +82,12 @@ def disturbance_lines(path: Course, parameters: ReferenceParameters) -> FloatArr
     count = _POINTS if path.period is not None else round(length / parameters.sample_time)
     step = length / max(2, count)
     motion = path.motion.evaluate(step * np.arange(max(2, count), dtype=np.float64))
-    disturbance = friction(motion.velocity, parameters.machine)
+    disturbance = friction(motion.velocity, parameters.guide)
     if path.period is None:
         disturbance = np.concatenate((disturbance, np.zeros((round(_REST / step), 5))))
-    found: FloatArray = np.abs(np.fft.rfft(disturbance, axis=0)) * (2.0 / len(disturbance))
-    found[0] *= 0.5
-    return found
+    lines: FloatArray = np.abs(np.fft.rfft(disturbance, axis=0)) * (2.0 / len(disturbance))
+    lines[0] *= 0.5
+    return lines
 
 
 def _span(path: Course, parameters: ReferenceParameters) -> float:
@@ -104,12 +105,12 @@ def harmonics(path: Course) -> tuple[tuple[float, ...], ...]:
     time = path.period / _POINTS * np.arange(_POINTS, dtype=np.float64)
     motion = path.motion.evaluate(time)
     spectrum = np.abs(np.fft.rfft(motion.position, axis=0))[1:]
-    found = []
+    lines = []
     for column in spectrum.T:
         size = column.max()
         strong = np.flatnonzero(column > max(_WEAK * size, _STILL * _POINTS))
-        found.append(tuple(2.0 * np.pi / path.period * float(order + 1) for order in strong))
-    return tuple(found)
+        lines.append(tuple(2.0 * np.pi / path.period * float(order + 1) for order in strong))
+    return tuple(lines)
 
 
 def warnings(parameters: ReferenceParameters) -> list[str]:
@@ -122,19 +123,18 @@ def warnings(parameters: ReferenceParameters) -> list[str]:
         return []
     path = course(parameters)
     error = expected_error(path, parameters)
-    found = []
-    model = parameters.internal_model
+    told = []
     for axis, lines in enumerate(harmonics(path)):
-        held = np.array(model.frequencies()[axis])
+        held = np.array(parameters.held_frequencies[axis])
         missed = [line for line in lines if not np.any(np.abs(held - line) <= _HELD * line)]
         if missed:
-            found.append(_missed(axis, missed, float(error[axis])))
+            told.append(_missed(axis, missed, float(error[axis])))
     if path.length is not None and path.length > parameters.duration:
-        found.append(
+        told.append(
             f'the course takes {path.length:.2f} s, its first {parameters.duration:g} s are '
             "followed (parameter 'duration')"
         )
-    return found
+    return told
 
 
 def summary(parameters: ReferenceParameters) -> list[str]:

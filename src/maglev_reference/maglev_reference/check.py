@@ -7,13 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from maglev_model.axes import AXES, UNITS, FloatArray
+from maglev_model.axes import AXES, UNITS, FloatArray, Y
 from maglev_model.parameters import ParameterError
-from maglev_reference.geometry import motor_gaps
-from maglev_reference.parameters import Limits
-from maglev_reference.profiles import Kinematics
+from maglev_model.platen import motor_gaps
+from maglev_reference.motion import Kinematics
+from maglev_reference.parameters import ReferenceParameters
 
-_SLACK = 1e-6  # share of a range that rounding may take
+_SLACK = 1e-6  # of a range, for rounding
 _MOTORS = tuple(f'the gap at motor {motor}' for motor in range(1, 5))
 
 
@@ -24,17 +24,17 @@ class UnreachableError(ParameterError):
 def check_samples(
     samples: Kinematics,
     first_time: float,
-    sample_time: float,
-    limits: Limits,
+    parameters: ReferenceParameters,
     jumps: npt.NDArray[np.bool_] | None = None,
 ) -> None:
-    """Refuse samples (n, 5) that leave the limits.
+    """Refuse consecutive samples (n, 5), the first at ``first_time`` [s], that leave the limits.
 
-    They are ``sample_time`` [s] apart, the first at ``first_time`` [s]; ``jumps`` (n,) marks those
-    at which the position may jump from the sample before. Raises :class:`UnreachableError` for the
-    first offence of a kind, in time.
+    ``jumps`` (n,) marks those at which the position may jump from the sample before. Raises
+    :class:`UnreachableError` for the first offence of a kind, in time.
     """
-    time = first_time + sample_time * np.arange(len(samples.position), dtype=np.float64)
+    limits = parameters.limits
+    count = np.arange(len(samples.position), dtype=np.float64)
+    time = first_time + parameters.sample_time * count
     checks = (
         ('{}', '', limits.lower, limits.upper),
         ('the speed of {}', '/s', [-v for v in limits.velocity], limits.velocity),
@@ -44,45 +44,50 @@ def check_samples(
         names = [name.format(axis) for axis in AXES]
         units = [unit + per_time for unit in UNITS]
         _within(values, np.array(lower), np.array(upper), time, names, units)
-    gaps = motor_gaps(samples.position, limits.radius)
+    gaps = motor_gaps(samples.position, parameters.machine.radius)
     low, high = limits.motor_gap
     _within(gaps, np.full(4, low), np.full(4, high), time, _MOTORS, ('m',) * 4)
-    _check_slew(samples.position, time, sample_time, limits, jumps)
+    _check_slew(samples.position, time, parameters, jumps)
 
 
-def utilisation(samples: Kinematics, limits: Limits) -> float:
-    """The largest share of any limit that samples (n, 5) use; up to 1 they are within."""
+def utilisation(samples: Kinematics, parameters: ReferenceParameters) -> float:
+    """How much samples (n, 5) use of the limit they are nearest to; up to 1 they are within."""
+    limits = parameters.limits
     lower, upper = np.array(limits.lower), np.array(limits.upper)
-    gaps = motor_gaps(samples.position, limits.radius)
+    gaps = motor_gaps(samples.position, parameters.machine.radius)
     low, high = limits.motor_gap
-    shares = (
+    used = (
         np.abs(samples.position - 0.5 * (lower + upper)) / (0.5 * (upper - lower)),
         np.abs(gaps - 0.5 * (low + high)) / (0.5 * (high - low)),
         np.abs(samples.velocity) / np.array(limits.velocity),
         np.abs(samples.acceleration) / np.array(limits.acceleration),
     )
-    return max(float(share.max()) for share in shares)
+    return max(float(part.max()) for part in used)
 
 
-def within(share: float) -> bool:
+def within(used: float) -> bool:
     """Whether a :func:`utilisation` is within limits, rounding aside."""
-    return share <= 1.0 + _SLACK
+    return used <= 1.0 + _SLACK
 
 
-def check_rest(position: FloatArray, gap: float, tolerance: float, limits: Limits) -> None:
+def check_rest(position: FloatArray, parameters: ReferenceParameters) -> None:
     """Refuse to lift off from a position (5,) [m, rad] that is not at rest on the lower stop.
 
-    ``gap`` is the gap there [m]. Raises :class:`UnreachableError`.
+    Raises :class:`UnreachableError`.
     """
+    gap, tolerance = parameters.lift_off.rest_gap, parameters.lift_off.rest_tolerance
     if not np.isfinite(position).all():
-        raise UnreachableError(f'unreachable reference: rest position {position} is not finite')
-    if abs(position[0] - gap) > tolerance:
         raise UnreachableError(
-            f'lift-off refused: the platen is at a gap of {1e3 * position[0]:.3f} mm, not on its '
+            f'lift-off refused: the position {position.tolist()} of the platen is not finite; '
+            'check the encoders'
+        )
+    if abs(position[Y] - gap) > tolerance:
+        raise UnreachableError(
+            f'lift-off refused: the platen is at a gap of {1e3 * position[Y]:.3f} mm, not on its '
             f'lower stop at {1e3 * gap:.3f} mm; lower it by hand or correct lift_off.rest_gap'
         )
     samples = Kinematics(position[None, :], np.zeros((1, 5)), np.zeros((1, 5)))
-    check_samples(samples, 0.0, 1.0, limits)
+    check_samples(samples, 0.0, parameters)
 
 
 def _within(
@@ -110,12 +115,11 @@ def _within(
 def _check_slew(
     position: FloatArray,
     time: FloatArray,
-    sample_time: float,
-    limits: Limits,
+    parameters: ReferenceParameters,
     jumps: npt.NDArray[np.bool_] | None,
 ) -> None:
     change = np.diff(position, axis=0)
-    bound = np.array(limits.velocity) * sample_time
+    bound = np.array(parameters.limits.velocity) * parameters.sample_time
     bad = np.abs(change) > bound * (1.0 + _SLACK) + 1e-12
     if jumps is not None:
         bad &= ~jumps[1:, None]

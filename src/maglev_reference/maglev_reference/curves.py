@@ -14,7 +14,8 @@ from numpy.polynomial import Chebyshev
 
 from maglev_model.axes import AXES, FloatArray, X, Y, Z
 from maglev_model.parameters import ParameterError
-from maglev_reference.profiles import Kinematics
+from maglev_model.quintic import minimum_jerk
+from maglev_reference.motion import Kinematics
 from maglev_reference.trajectory_parameters import (
     ChirpParameters,
     CircleParameters,
@@ -78,14 +79,14 @@ class Sinusoids:
 
     def evaluate(self, time: FloatArray) -> Kinematics:
         """Position, velocity and acceleration at each time (n,) [s]."""
-        found = _standing(self._offset, len(time))
+        samples = _standing(self._offset, len(time))
         for axis, amplitude, frequency, phase in self.terms:
             angle = frequency * time + phase
             sine = amplitude * np.sin(angle)
-            found.position[:, axis] += sine
-            found.velocity[:, axis] += amplitude * frequency * np.cos(angle)
-            found.acceleration[:, axis] -= frequency**2 * sine
-        return found
+            samples.position[:, axis] += sine
+            samples.velocity[:, axis] += amplitude * frequency * np.cos(angle)
+            samples.acceleration[:, axis] -= frequency**2 * sine
+        return samples
 
 
 class Helix:
@@ -108,25 +109,25 @@ class Helix:
 
     def evaluate(self, time: FloatArray) -> Kinematics:
         """Position, velocity and acceleration at each time (n,) [s]."""
-        found = _standing(self._home, len(time))
-        share, rate, change = self._share(time)
+        samples = _standing(self._home, len(time))
+        progress, rate, change = self._progress(time)
         (gap_0, gap_1), (radius_0, radius_1) = self._ends
-        found.position[:, Y] = gap_0 + (gap_1 - gap_0) * share
-        found.velocity[:, Y] = (gap_1 - gap_0) * rate
-        found.acceleration[:, Y] = (gap_1 - gap_0) * change
-        radius = radius_0 + (radius_1 - radius_0) * share
+        samples.position[:, Y] = gap_0 + (gap_1 - gap_0) * progress
+        samples.velocity[:, Y] = (gap_1 - gap_0) * rate
+        samples.acceleration[:, Y] = (gap_1 - gap_0) * change
+        radius = radius_0 + (radius_1 - radius_0) * progress
         growth, bend = (radius_1 - radius_0) * rate, (radius_1 - radius_0) * change
         omega = self._frequency
         for axis, phase in ((X, 0.0), (Z, 0.5 * math.pi)):
             sine, cosine = np.sin(omega * time + phase), np.cos(omega * time + phase)
-            found.position[:, axis] += radius * sine
-            found.velocity[:, axis] = growth * sine + radius * omega * cosine
-            found.acceleration[:, axis] = (
+            samples.position[:, axis] += radius * sine
+            samples.velocity[:, axis] = growth * sine + radius * omega * cosine
+            samples.acceleration[:, axis] = (
                 bend - radius * omega**2
             ) * sine + 2.0 * growth * omega * cosine
-        return found
+        return samples
 
-    def _share(self, time: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _progress(self, time: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """How far from the first end, 0 to 1, with its two derivatives [1/s, 1/s^2]."""
         shifted = np.mod(time + self._half, self.period) - self._half
         way = np.abs(shifted)
@@ -135,11 +136,12 @@ class Helix:
         rate, b = self._rate, self._rounding
         s = 0.5 + 0.5 * np.minimum(near / b, 1.0)
         eased = s**4 * (2.5 + s * (-3.0 + s))  # integral of the smooth step from -1 to 1
-        share = 2.0 * b * rate * (2.0 * eased - s + 0.34375) + rate * np.maximum(near - b, 0.0)
-        speed = rate * (2.0 * s**3 * (10.0 + s * (-15.0 + 6.0 * s)) - 1.0)
-        change = rate / b * 30.0 * (s * (1.0 - s)) ** 2
-        share, change = np.where(far, 1.0 - share, share), np.where(far, -change, change)
-        return share, speed * np.sign(shifted), change
+        progress = 2.0 * b * rate * (2.0 * eased - s + 0.34375) + rate * np.maximum(near - b, 0.0)
+        step, slope, _ = minimum_jerk(s)
+        speed = rate * (2.0 * step - 1.0)
+        change = rate / b * slope
+        progress, change = np.where(far, 1.0 - progress, progress), np.where(far, -change, change)
+        return progress, speed * np.sign(shifted), change
 
 
 class Square:
@@ -171,7 +173,7 @@ class Square:
 
     def evaluate(self, time: FloatArray) -> Kinematics:
         """Position, velocity and acceleration at each time (n,) [s]."""
-        found = _standing(self._home, len(time))
+        samples = _standing(self._home, len(time))
         way = self._speed * time
         quarter = np.floor(way / self._quarter)
         way = way - quarter * self._quarter
@@ -181,18 +183,18 @@ class Square:
         along = before + self._corner * self._along(u)
         across = after + self._corner * self._across(u) - 0.5 * self._side
         heading = _heading(u)
-        bend = self._speed**2 * 15.0 * math.pi * (u * (1.0 - u)) ** 2 / self._corner
+        bend = 0.5 * math.pi * self._speed**2 * minimum_jerk(u)[1] / self._corner
         sine, cosine = np.sin(heading), np.cos(heading)
         side = quarter.astype(np.int64) % 4
         for values, forward, sideward in zip(
-            found,
+            samples,
             (along, self._speed * cosine, -bend * sine),
             (across, self._speed * sine, bend * cosine),
             strict=True,
         ):
             values[:, X] += np.choose(side, (forward, -sideward, -forward, sideward))
             values[:, Z] += np.choose(side, (sideward, forward, -sideward, -forward))
-        return found
+        return samples
 
 
 class Chirp:
@@ -213,7 +215,7 @@ class Chirp:
 
     def evaluate(self, time: FloatArray) -> Kinematics:
         """Position, velocity and acceleration at each time (n,) [s]."""
-        found = _standing(self._home, len(time))
+        samples = _standing(self._home, len(time))
         swept = np.clip(time, 0.0, self.length)
         after = np.maximum(time - self.length, 0.0)
         frequency = self._start + self._rise * swept
@@ -222,22 +224,22 @@ class Chirp:
         angle += self._start * before + self._end * after
         rise = np.where((time >= 0.0) & (time < self.length), self._rise, 0.0)
         sine, cosine = self._amplitude * np.sin(angle), self._amplitude * np.cos(angle)
-        found.position[:, self.axis] -= cosine
-        found.velocity[:, self.axis] = frequency * sine
-        found.acceleration[:, self.axis] = frequency**2 * cosine + rise * sine
-        return found
+        samples.position[:, self.axis] -= cosine
+        samples.velocity[:, self.axis] = frequency * sine
+        samples.acceleration[:, self.axis] = frequency**2 * cosine + rise * sine
+        return samples
 
 
 def _integral(function: Callable[[FloatArray], FloatArray]) -> Chebyshev:
     """The integral of a smooth function from 0 on, up to 1."""
-    found: Chebyshev = Chebyshev.interpolate(function, _DEGREE, domain=[0.0, 1.0]).integ(lbnd=0.0)
-    return found
+    interpolant = Chebyshev.interpolate(function, _DEGREE, domain=[0.0, 1.0])
+    integral: Chebyshev = interpolant.integ(lbnd=0.0)
+    return integral
 
 
 def _heading(u: FloatArray) -> FloatArray:
-    """Direction in a corner [rad] at a share ``u`` of its length."""
-    turned: FloatArray = 0.5 * math.pi * u**3 * (10.0 + u * (-15.0 + 6.0 * u))
-    return turned
+    """Direction in a corner [rad] at ``u`` of its length, 0 to 1."""
+    return 0.5 * math.pi * minimum_jerk(u)[0]
 
 
 def _standing(position: FloatArray, count: int) -> Kinematics:

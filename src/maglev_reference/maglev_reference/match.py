@@ -1,4 +1,4 @@
-"""Internal models that match a repeated trajectory, as an overlay for controller and reference.
+"""Internal models that match a repeated trajectory, as an overlay for all nodes.
 
     match scenario_square.yaml > matched_square.yaml
 
@@ -46,32 +46,29 @@ def matched(
     fundamental = 2.0 * math.pi / path.period
     lines = disturbance_lines(path, parameters)[: _HIGHEST + 1]
     omega = fundamental * np.arange(1, len(lines), dtype=np.float64)
-    model = parameters.internal_model
-    found = {}
-    for axis, name in enumerate(AXES):
+    sampling = parameters.internal_model.sampling
+    multiples = {}
+    for axis, (name, loop) in enumerate(zip(AXES, parameters.loops, strict=True)):
         size = np.where(lines[1:, axis] < _NEGLIGIBLE, 0.0, lines[1:, axis])
         held: list[float] = [0.0]
         for _ in range(count):
             frequencies = [fundamental * order for order in held]
-            left = size * compliance(omega, frequencies, model)
+            left = size * compliance(omega, frequencies, loop, sampling)
             left[omega + sum(frequencies) > total] = 0.0
             if not left.any():
                 break
             held.append(float(np.argmax(left)) + 1.0)
         if len(held) > 1:
-            found[name] = sorted(held)
-    return fundamental, found
+            multiples[name] = sorted(held)
+    return fundamental, multiples
 
 
 def overlay(fundamental: float, multiples: dict[str, list[float]]) -> str:
-    """The parameter file that gives both nodes these internal models."""
-    text = ['controller:', '  ros__parameters:']
+    """The parameter file that gives controller and reference these internal models."""
+    text = ['/**:', '  ros__parameters:']
     text += ['    internal_model:', f'      fundamental: {fundamental!r}']
     for axis, values in multiples.items():
         text += [f'    {axis}:', f'      multiples: {values}']
-    text += ['reference:', '  ros__parameters:']
-    text += ['    internal_model:', f'      fundamental: {fundamental!r}']
-    text += [f'      {axis}: {values}' for axis, values in multiples.items()]
     return '\n'.join(text) + '\n'
 
 

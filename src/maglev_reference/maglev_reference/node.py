@@ -7,24 +7,26 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import Trigger
 
 from maglev_model.parameters import parameter
 from maglev_model.phases import Phase
+from maglev_model.platen import outputs_of_gaps
 from maglev_msgs.msg import Currents, Measurement, Reference
+from maglev_node.graph_guard import GraphGuard
 from maglev_node.node import MaglevNode, SourceParameters
-from maglev_node.node import main as run_main
 from maglev_node.polling import Queues
+from maglev_node.process import main as run_main
 from maglev_node.stamp import stamp_now
 from maglev_node.topics import CURRENTS, MEASUREMENT, REFERENCE, sample_qos
 from maglev_reference.accuracy import summary, warnings
 from maglev_reference.check import UnreachableError
-from maglev_reference.geometry import outputs
 from maglev_reference.parameters import ReferenceParameters
+from maglev_reference.run import ReferenceRun
 from maglev_reference.timeline import Timeline
 
-_BURST = 128  # messages at one poll; half of what a reader's queue holds
 _REMINDER = 5.0  # between two lines about what is waited for [s]
 
 
@@ -79,14 +81,10 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
             self.get_logger().warning(line)
         for line in summary(self.parameters):
             self.get_logger().info(line)
-        self.claim(REFERENCE, 'reference')
-        self._timeline: Timeline | None = None
+        self._graph = GraphGuard(self)
+        self._graph.claim(REFERENCE, 'reference')
+        self._run = ReferenceRun(self.parameters, self.parameters.lead, self.parameters.autostart)
         self._expected = self.parameters.watchers + 1  # and the controller
-        self._origin = 0  # the stage's sequence at the timeline's sample 0
-        self._next = 0  # the timeline's first sample not yet published
-        self._newest = 0  # the stage's newest sequence
-        self._autostart = self.parameters.autostart
-        self._phase = Phase.REST
         self._seen = self._reminded = time.monotonic()
         self._message = Reference()
         self._message.header.frame_id = 'stage'
@@ -105,22 +103,15 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
     def _poll(self) -> None:
         measurement = None
         for message, _ in self._measurements.take(1):
-            measurement = message
-        if measurement is not None and measurement.sequence < self._newest:
-            if self._phase in (Phase.REST, Phase.END):
-                self._begin_anew()
-            else:
-                measurement = None  # of a second stage, which will find the first and leave
-        if measurement is not None:
-            self._seen = time.monotonic()
-            self._newest = int(measurement.sequence)
-        if self._timeline is None:
+            if self._run.observe(int(message.sequence)):
+                measurement, self._seen = message, time.monotonic()
+        if not self._run.started:
             self._wait(measurement)
         elif measurement is None:
-            self._watch(self._timeline)
-        if self._timeline is not None:
-            self._publish(self._timeline)
-            self._follow_phase(self._timeline)
+            self._watch()
+        if self._run.started:
+            self._publish()
+            self._follow_phase()
 
     def _wait(self, measurement: Measurement | None) -> None:
         answered = self._answers is None or any(self._answers.take(1))
@@ -142,37 +133,31 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         return f'waiting for the controller to answer on {CURRENTS}'
 
     def _start(self, measurement: Measurement) -> None:
-        if not self.alone():
+        if not self._graph.alone():
             return
+        radius = self.parameters.machine.radius
+        rest = outputs_of_gaps(np.array(measurement.gap), measurement.x, measurement.z, radius)
         try:
-            rest = outputs(
-                measurement.gap, measurement.x, measurement.z, self.parameters.limits.radius
-            )
-            self._timeline = Timeline(self.parameters, rest, self._autostart)
+            self._run.start(rest)
         except UnreachableError as error:
             self._refuse(str(error))
-        except ValueError as error:
-            self._refuse(f'lift-off refused: {error}; check the encoders')
         else:
-            self._origin = self._newest
-            start = 'starting' if self._autostart else 'resting until ~/lift_off'
-            self.get_logger().info(f'{start} at sample {self._origin}')
+            start = 'starting' if self._run.autostart else 'resting until ~/lift_off'
+            self.get_logger().info(f'{start} at sample {self._run.newest}')
 
     def _refuse(self, message: str) -> None:
         """Fail; but while another reference may yet be discovered, it may be flying the platen."""
-        if not self.on_probation():
+        if not self._graph.on_probation():
             self.fail(message)
 
-    def _publish(self, timeline: Timeline) -> None:
-        wanted = self._newest + self.parameters.lead - self._origin
-        count = min(wanted - self._next, _BURST)
-        if count <= 0:
+    def _publish(self) -> None:
+        due = self._run.due()
+        if due is None:
             return
-        block = timeline.block(self._next, count)
+        first, block = due
         message = self._message
         stamp_now(message.header.stamp)
-        first = self._origin + self._next
-        for row in range(count):
+        for row in range(len(block.phase)):
             message.sequence = first + row
             message.phase = int(block.phase[row])
             message.segment = int(block.segment[row])
@@ -181,60 +166,51 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
             message.acceleration = block.acceleration[row]
             message.target = block.target[row]
             self._publisher.publish(message)
-        self._next += count
 
-    def _follow_phase(self, timeline: Timeline) -> None:
+    def _follow_phase(self) -> None:
         """Say what the stage is asked to do now, and end where that is wanted."""
-        sample = self._newest - self._origin
-        phase = timeline.phase(sample)
-        if phase != self._phase:
-            self._phase = phase
-            self.get_logger().info(f'{phase.name} at sample {self._newest}')
-        if self.parameters.exit_at_end and phase == Phase.END and sample > (timeline.end or 0):
+        if self._run.enter_phase():
+            self.get_logger().info(f'{self._run.phase.name} at sample {self._run.newest}')
+        if self.parameters.exit_at_end and self._run.over:
             self.finish(0)
 
-    def _watch(self, timeline: Timeline) -> None:
+    def _watch(self) -> None:
         silent = time.monotonic() - self._seen
         if silent < self.parameters.timeout:
             return
-        if self._phase in (Phase.REST, Phase.END):  # nothing flies: another stage may follow
-            if self._phase == Phase.END and self.parameters.exit_at_end:
+        if self._run.grounded:  # another stage may follow
+            if self._run.phase == Phase.END and self.parameters.exit_at_end:
                 self.finish(0)
             return
         who = 'the stage, or the controller it waits for, has stopped'
         if self._measurements.publisher_count() == 0:
             who = 'the stage is gone'
-        self.fail(f'no measurement for {silent:.1f} s after sample {self._newest}: {who}')
-
-    def _begin_anew(self) -> None:
-        """Another stage has taken the place of one that stopped: wait for what is asked of it."""
-        self._timeline, self._next = None, 0
-        self._autostart, self._phase = False, Phase.REST
+        self.fail(f'no measurement for {silent:.1f} s after sample {self._run.newest}: {who}')
 
     def _lift_off(self, _request: Any, response: Any) -> Any:
-        if self._timeline is None:
+        if not self._run.started:
             response.success, response.message = False, self._waiting_for()
         else:
-            response.success = self._timeline.lift_off(self._next)
+            response.success = self._run.lift_off()
             response.message = 'lifting off' if response.success else 'the reference is running'
         return response
 
     def _land(self, _request: Any, response: Any) -> Any:
-        if self._timeline is None:
+        if not self._run.started:
             response.success, response.message = False, self._waiting_for()
         else:
-            response.success = self._timeline.land(self._next)
+            response.success = self._run.land()
             response.message = 'landing' if response.success else 'landing already, or landed'
         return response
 
     def diagnose(self) -> tuple[bytes, str, Mapping[str, object]]:
         """WARN while something is waited for."""
-        if self._timeline is None:
+        if not self._run.started:
             return DiagnosticStatus.WARN, self._waiting_for(), {}
         facts = {
-            'phase': self._phase.name,
-            'sequence': self._newest,
-            'ahead': self._origin + self._next - 1 - self._newest,
+            'phase': self._run.phase.name,
+            'sequence': self._run.newest,
+            'ahead': self._run.ahead,
         }
         return DiagnosticStatus.OK, 'running', facts
 

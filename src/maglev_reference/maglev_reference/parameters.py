@@ -5,8 +5,10 @@ from __future__ import annotations
 import dataclasses
 
 from maglev_model.axes import AXES
+from maglev_model.guide import GuideParameters
+from maglev_model.loop_parameters import AxisLoopParameters, FundamentalParameters
+from maglev_model.machine import MachineParameters
 from maglev_model.parameters import ParameterError, group, parameter
-from maglev_reference.model_parameters import InternalModelParameters, MachineParameters
 from maglev_reference.trajectory_parameters import (
     ChirpParameters,
     CircleParameters,
@@ -34,7 +36,7 @@ TRAJECTORIES = (
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Limits:
+class ReferenceLimits:
     """What is refused before moving. Arrays are in the order y, x, z, phi, theta.
 
     The gap at a motor includes the tilt, (5). The paper gives its upper end as 31 mm for the platen
@@ -91,18 +93,11 @@ class Limits:
     )
     current: float = parameter(
         6.0,
-        description='greatest phase current of a motor by the machine below, friction included; '
+        description='greatest phase current of a motor, friction included; '
         'the amplifiers give 7 A, the rest is for feedback',
         unit='A',
         lower=0.1,
         upper=100.0,
-    )
-    radius: float = parameter(
-        0.397,
-        description='r, from the centre of the platen to the centre of a motor',
-        unit='m',
-        lower=0.05,
-        upper=2.0,
     )
 
     def __post_init__(self) -> None:
@@ -140,7 +135,7 @@ class LiftOffParameters:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class LandingParameters:
+class DescentParameters:
     """From any position down to the lower stop, the last part at crawling speed."""
 
     brake_time: float = parameter(
@@ -160,8 +155,24 @@ class LandingParameters:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
+class InternalModelParameters(FundamentalParameters):
+    """The controller's internal models (14): what repeats at their frequencies is learnt."""
+
+    sampling: float = parameter(
+        2.05,
+        description='error with sampling and observer, by that of the same weights without',
+        lower=1.0,
+        upper=100.0,
+    )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class ReferenceParameters:
-    """The reference node's table."""
+    """The reference node's table.
+
+    From ``machine`` on the groups are the other nodes' too: what the stage is, by which currents
+    and friction are foretold, and the controller's loops, by which the expected error is.
+    """
 
     sample_time: float = parameter(
         0.001, description='time from one sample to the next', unit='s', lower=1e-4, upper=0.01
@@ -208,7 +219,24 @@ class ReferenceParameters:
     square: SquareParameters = group(SquareParameters)
     chirp: ChirpParameters = group(ChirpParameters)
     file: FileParameters = group(FileParameters)
-    landing: LandingParameters = group(LandingParameters)
-    limits: Limits = group(Limits)
+    landing: DescentParameters = group(DescentParameters)
+    limits: ReferenceLimits = group(ReferenceLimits)
     machine: MachineParameters = group(MachineParameters)
+    guide: GuideParameters = group(GuideParameters)
     internal_model: InternalModelParameters = group(InternalModelParameters)
+    y: AxisLoopParameters = group(AxisLoopParameters)
+    x: AxisLoopParameters = group(AxisLoopParameters)
+    z: AxisLoopParameters = group(AxisLoopParameters)
+    phi: AxisLoopParameters = group(AxisLoopParameters)
+    theta: AxisLoopParameters = group(AxisLoopParameters)
+
+    @property
+    def loops(self) -> tuple[AxisLoopParameters, ...]:
+        """The controller's loops in output order."""
+        return (self.y, self.x, self.z, self.phi, self.theta)
+
+    @property
+    def held_frequencies(self) -> tuple[tuple[float, ...], ...]:
+        """The frequencies of the internal models [rad/s], by output."""
+        fundamental = self.internal_model.fundamental
+        return tuple(tuple(fundamental * k for k in loop.multiples) for loop in self.loops)

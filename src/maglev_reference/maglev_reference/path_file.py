@@ -20,7 +20,7 @@ from scipy.interpolate import make_interp_spline
 
 from maglev_model.axes import AXES, UNITS, FloatArray
 from maglev_model.parameters import ParameterError
-from maglev_reference.profiles import Kinematics
+from maglev_reference.motion import Kinematics
 from maglev_reference.trajectory_parameters import FileParameters
 
 COLUMNS = ('t', *AXES)

@@ -10,23 +10,17 @@ import numpy as np
 
 from maglev_model.axes import PHI, FloatArray, Y
 from maglev_model.phases import Phase
+from maglev_model.quintic import minimum_jerk_time
 from maglev_reference.check import utilisation, within
-from maglev_reference.currents import current_use
+from maglev_reference.currents import current_utilisation
+from maglev_reference.motion import Motion, Quintic, Stand, State, state_at
 from maglev_reference.parameters import ReferenceParameters
-from maglev_reference.profiles import (
-    Motion,
-    Quintic,
-    Stand,
-    State,
-    minimum_jerk_time,
-    state_at,
-)
 from maglev_reference.trajectories import Delayed, course, steps
 
 _STRETCH = 1.25  # from one tried move time to the next
 _TRIALS = 24
 _GRID = 201  # points at which a tried move is checked
-_BRAKING_MARGIN = 0.1  # share of the range that a braking platen keeps away from its limits
+_BRAKING_MARGIN = 0.1  # of the range, that a braking platen keeps away from its limits
 _SAMPLE_MAX = 2**62
 
 
@@ -204,17 +198,19 @@ class Planner:
         With ``best`` the one that offends least is taken where none is within; otherwise the one
         of ``duration`` is, and the check of the whole reference says what is wrong with it.
         """
-        limits = self._parameters.limits
         chosen: tuple[float, Quintic, int] | None = None
         for trial in self._trial_times(end(duration), duration):
             count = max(1, self._samples(trial))
             time = count * self._parameters.sample_time
             motion = Quintic(self._state, end(time), time)
             samples = motion.evaluate(np.linspace(0.0, time, _GRID))
-            share = max(utilisation(samples, limits), current_use(samples, self._parameters))
-            if chosen is None or within(share) or (best and share < chosen[0]):
-                chosen = (share, motion, count)
-            if within(share):
+            used = max(
+                utilisation(samples, self._parameters),
+                current_utilisation(samples, self._parameters),
+            )
+            if chosen is None or within(used) or (best and used < chosen[0]):
+                chosen = (used, motion, count)
+            if within(used):
                 break
         assert chosen is not None
         _, motion, count = chosen

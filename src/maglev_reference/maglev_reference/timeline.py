@@ -18,8 +18,8 @@ from maglev_model.axes import FloatArray, Y
 from maglev_model.phases import Phase
 from maglev_reference.check import check_rest, check_samples
 from maglev_reference.currents import check_currents
+from maglev_reference.motion import Kinematics, State, state_at
 from maglev_reference.parameters import ReferenceParameters
-from maglev_reference.profiles import Kinematics, State
 from maglev_reference.segments import Planner, Segment
 
 _CHUNK = 256  # samples evaluated together, so that a value does not depend on who asks for how many
@@ -159,7 +159,7 @@ class Timeline:
         upper = self._parameters.limits.upper[Y]
         if position[Y] > upper and position[Y] - upper <= table.rest_tolerance:
             position[Y] = upper
-        check_rest(position, table.rest_gap, table.rest_tolerance, self._parameters.limits)
+        check_rest(position, self._parameters)
         return position
 
     def _full_plan(self, state: State, first: int, number: int) -> Planner:
@@ -175,8 +175,7 @@ class Timeline:
         if segment.jumps and segment.first == sample:
             segment = self._segments[self._index(sample - 1)]
         time = (sample - segment.first) * self._parameters.sample_time
-        found = segment.motion.evaluate(np.array([time]))
-        return State(*(values[0] for values in found))
+        return state_at(segment.motion, time)
 
     def _adopt(self, segments: list[Segment]) -> None:
         self._segments = list(segments)
@@ -199,7 +198,7 @@ class Timeline:
         return self._cache
 
     def _evaluate(self, first: int, count: int) -> Block:
-        found = Block.empty(count)
+        block = Block.empty(count)
         index = self._index(first)
         done = 0
         while done < count:
@@ -210,13 +209,13 @@ class Timeline:
             start = sample - segment.first
             time = np.arange(start, start + take, dtype=np.float64)
             moved = segment.motion.evaluate(self._parameters.sample_time * time)
-            found.phase[rows] = segment.phase
-            found.segment[rows] = segment.number
-            found.target[rows] = segment.target
-            found.position[rows], found.velocity[rows], found.acceleration[rows] = moved
+            block.phase[rows] = segment.phase
+            block.segment[rows] = segment.number
+            block.target[rows] = segment.target
+            block.position[rows], block.velocity[rows], block.acceleration[rows] = moved
             done += take
             index += 1
-        return found
+        return block
 
     def _check(self) -> None:
         """What is measured first, so that it and not the way to it is found at fault."""
@@ -233,5 +232,5 @@ class Timeline:
             block = self._evaluate(start, count)
             samples = Kinematics(block.position, block.velocity, block.acceleration)
             jumps = np.isin(np.arange(start, start + count), jumps_at)
-            check_samples(samples, start * sample_time, sample_time, self._parameters.limits, jumps)
-            check_currents(samples, start * sample_time, sample_time, self._parameters)
+            check_samples(samples, start * sample_time, self._parameters, jumps)
+            check_currents(samples, start * sample_time, self._parameters)

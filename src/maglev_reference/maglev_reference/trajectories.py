@@ -8,21 +8,15 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from maglev_model.axes import AXES, UNITS, FloatArray
+from maglev_model.quintic import minimum_jerk_time
 from maglev_reference.check import UnreachableError
 from maglev_reference.curves import Chirp, Helix, Sinusoids, Square
+from maglev_reference.motion import Kinematics, Motion, Quintic, Stand, State
 from maglev_reference.parameters import ReferenceParameters
-from maglev_reference.profiles import (
-    Kinematics,
-    Motion,
-    Quintic,
-    Stand,
-    State,
-    minimum_jerk_time,
-)
 from maglev_reference.waypoints import Waypoints
 
 _PERIODS = 200  # of the slowest sinusoid, in which a sum of sinusoids may repeat
-_WHOLE = 1e-3  # share of a period taken for a whole one
+_WHOLE = 1e-3  # of a period, by which a whole one may be missed
 
 
 class Delayed:
@@ -130,7 +124,7 @@ class Step(NamedTuple):
 
 def steps(parameters: ReferenceParameters) -> list[Step]:
     """The steps in order. Raises UnreachableError for one larger than the limit of its axis."""
-    found = []
+    sequence = []
     table = parameters.steps
     home = np.array(parameters.home)
     for number, (axis, start, target) in enumerate(
@@ -150,5 +144,5 @@ def steps(parameters: ReferenceParameters) -> list[Step]:
             least = minimum_jerk_time(target - start, math.inf, table.acceleration[index])
             duration = max(table.shaping_time, least)
             motion = Quintic(State.at_rest(before), State.at_rest(after), duration)
-        found.append(Step(before, after, motion, not table.shaped))
-    return found
+        sequence.append(Step(before, after, motion, not table.shaped))
+    return sequence

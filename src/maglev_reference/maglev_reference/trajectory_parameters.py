@@ -7,9 +7,8 @@ import math
 from collections.abc import Sequence
 
 from maglev_model.axes import AXES
+from maglev_model.loop_parameters import REFERENCE_FREQUENCY
 from maglev_model.parameters import ParameterError, group, parameter
-
-OMEGA_0 = 1.5 * math.pi  # the paper's w_0 [rad/s]
 
 
 def same_length(where: str, names: Sequence[str], lengths: Sequence[int]) -> None:
@@ -38,7 +37,7 @@ class TiltSinusoids:
         upper=0.014,
     )
     frequency: tuple[float, ...] = parameter(
-        (OMEGA_0,),
+        (REFERENCE_FREQUENCY,),
         description='angular frequency of each sinusoid',
         unit='rad/s',
         lower=0.01,
@@ -141,7 +140,7 @@ class CircleParameters:
 
     radius: float = parameter(0.03, description='its radius', unit='m', lower=1e-5, upper=0.05)
     frequency: float = parameter(
-        OMEGA_0, description='angular frequency', unit='rad/s', lower=0.01, upper=200.0
+        REFERENCE_FREQUENCY, description='angular frequency', unit='rad/s', lower=0.01, upper=200.0
     )
 
 
@@ -167,7 +166,11 @@ class HelixParameters:
     )
     turns: int = parameter(4, description='turns from one end to the other', lower=1, upper=1000)
     frequency: float = parameter(
-        OMEGA_0, description='angular frequency of the turns', unit='rad/s', lower=0.01, upper=200.0
+        REFERENCE_FREQUENCY,
+        description='angular frequency of the turns',
+        unit='rad/s',
+        lower=0.01,
+        upper=200.0,
     )
 
 
@@ -179,7 +182,11 @@ class LissajousParameters:
     """
 
     fundamental: float = parameter(
-        OMEGA_0 / 3.0, description='angular frequency', unit='rad/s', lower=0.01, upper=200.0
+        REFERENCE_FREQUENCY / 3.0,
+        description='angular frequency',
+        unit='rad/s',
+        lower=0.01,
+        upper=200.0,
     )
     amplitude: tuple[float, ...] = parameter(
         (0.0, 0.03, 0.03, 0.0, 0.0),

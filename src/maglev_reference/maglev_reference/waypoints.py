@@ -7,10 +7,11 @@ import math
 import numpy as np
 
 from maglev_model.axes import FloatArray
-from maglev_reference.profiles import Kinematics, minimum_jerk_time
+from maglev_model.quintic import minimum_jerk, minimum_jerk_time
+from maglev_reference.motion import Kinematics
 from maglev_reference.trajectory_parameters import WaypointParameters
 
-_ARRIVED = 1e-9  # share of a move by which it is over, rounding aside
+_ARRIVED = 1e-9  # of a move, that may be left when it is over, for rounding
 
 
 class Waypoints:
@@ -55,8 +56,7 @@ class Waypoints:
         s = np.clip((time - self._starts[move])[:, None] / took, 0.0, 1.0)
         s = np.where(s > 1.0 - _ARRIVED, 1.0, s)
         change = self._change[move]
+        way, slope, bend = minimum_jerk(s)
         return Kinematics(
-            self._from[move] + change * (s**3 * (10.0 + s * (-15.0 + 6.0 * s))),
-            change * (30.0 * (s * (1.0 - s)) ** 2) / took,
-            change * (60.0 * s * (1.0 - s) * (1.0 - 2.0 * s)) / took**2,
+            self._from[move] + change * way, change * slope / took, change * bend / took**2
         )

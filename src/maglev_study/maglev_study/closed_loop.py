@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,22 +11,15 @@ from maglev_controller.control_arrays import ControlArrays, Currents, Reading, R
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import MeasurementFault, Regulator
 from maglev_controller.sample_step import SATURATED, control_step
+from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
-from maglev_plant.arrays import STATE, StageArrays
+from maglev_model.records import Block
+from maglev_plant.arrays import StageArrays
 from maglev_plant.dynamics import advance
 from maglev_plant.encoder import encode
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
-
-FloatArray = NDArray[np.float64]
-
-
-class References(NamedTuple):
-    """A reference for n samples, (n, 5) each: y, x, z, phi, theta [m, rad] and derivatives."""
-
-    position: FloatArray
-    velocity: FloatArray
-    acceleration: FloatArray
+from maglev_study.references import References
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,7 +45,7 @@ class Run:
 @compiled
 def _loop(
     control: ControlArrays,
-    stage: StageArrays,
+    block: Block,
     position: FloatArray,
     velocity: FloatArray,
     acceleration: FloatArray,
@@ -63,11 +55,11 @@ def _loop(
     delayed: bool,
 ) -> int:
     """All samples, or up to the first that the regulator refuses; returns how many went well."""
+    stage: StageArrays = block[0]
     answer = np.zeros(8)
     for k in range(position.shape[0]):
-        for i in range(10):
-            state[k, i] = stage.memory[STATE + i]
-        encode(stage.scalars, stage.memory, stage.reading)
+        state[k] = stage.state
+        encode(block)
         code[k] = control_step(
             control,
             Reading(stage.reading[:4], stage.reading[4], stage.reading[5]),
@@ -77,11 +69,11 @@ def _loop(
         if code[k] > SATURATED:
             return k
         if delayed:
-            advance(stage.scalars, stage.axes, stage.memory, stage.command)
+            advance(block)
         for i in range(8):
             stage.command[i] = current[k, i] = answer[i]
         if not delayed:
-            advance(stage.scalars, stage.axes, stage.memory, stage.command)
+            advance(block)
     return int(position.shape[0])
 
 
@@ -110,7 +102,15 @@ def run(
     code = np.zeros(n, dtype=np.int8)
     arrays = stage.arrays
     done = _loop(
-        regulator.arrays, arrays, position, velocity, acceleration, state, current, code, delayed
+        regulator.arrays,
+        arrays.block,
+        position,
+        velocity,
+        acceleration,
+        state,
+        current,
+        code,
+        delayed,
     )
     if done < n:
         gap, x, z = arrays.reading[:4], float(arrays.reading[4]), float(arrays.reading[5])

@@ -12,7 +12,8 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from maglev_model.axes import AXES
 from maglev_monitor.bag.analysis import Analysis
-from maglev_monitor.report.curves import StepSeries
+from maglev_monitor.metrics.curves import StepCurves
+from maglev_monitor.metrics.readable import micro
 from maglev_monitor.report.drawing import (
     ERROR,
     FLOOR,
@@ -29,7 +30,6 @@ from maglev_monitor.report.drawing import (
     to_plot,
     units,
 )
-from maglev_monitor.report.units import micro
 from maglev_study.paper import STEPS, TRACKING, PublishedStep
 
 Runs = Mapping[str, Mapping[str, Analysis]]
@@ -79,16 +79,16 @@ def paper_plots(runs: Runs) -> Iterator[Plot]:
             tails = {
                 name: analysis
                 for name, analysis in runs.get(scenario, {}).items()
-                if len(analysis.series.tail[0])
+                if len(analysis.curves.tail[0])
             }
             if tails:
                 yield to_plot(title, _DETAIL, _tracking_figure(tails, scenario, axes))
 
 
-def find_step(analysis: Analysis, step: PublishedStep) -> StepSeries | None:
-    """The series of a step of the paper in a run, None when it was not made."""
+def find_step(analysis: Analysis, step: PublishedStep) -> StepCurves | None:
+    """The curves of a step of the paper in a run, None when it was not made."""
     index = AXES.index(step.axis)
-    for found in analysis.series.steps:
+    for found in analysis.curves.steps:
         if np.allclose(
             [found.start[index], found.target[index]], [step.start, step.target], atol=1e-9
         ):
@@ -99,17 +99,17 @@ def find_step(analysis: Analysis, step: PublishedStep) -> StepSeries | None:
 def _step_figure(analyses: Mapping[str, Analysis], steps: Sequence[PublishedStep]) -> Figure | None:
     rows = []
     for step in steps:
-        series = {name: find_step(analysis, step) for name, analysis in analyses.items()}
-        if any(found is not None for found in series.values()):
-            rows.append((step, series))
+        curves = {name: find_step(analysis, step) for name, analysis in analyses.items()}
+        if any(found is not None for found in curves.values()):
+            rows.append((step, curves))
     if not rows:
         return None
     figure: Figure
     figure, panels = plt.subplots(
         len(rows), 2, figsize=(11.0, 2.5 * len(rows) + 0.3), squeeze=False
     )
-    for (left, right), (step, series) in zip(panels, rows, strict=True):
-        for colour, (name, found) in zip(_COLOURS, series.items(), strict=False):
+    for (left, right), (step, curves) in zip(panels, rows, strict=True):
+        for colour, (name, found) in zip(_COLOURS, curves.items(), strict=False):
             if found is not None:
                 _step_curves(left, right, analyses[name], (name, colour), step.axis, found)
         _step_bounds(left, right, next(iter(analyses.values())), step)
@@ -125,15 +125,15 @@ def _step_curves(
     analysis: Analysis,
     style: tuple[str, str],
     axis: str,
-    series: StepSeries,
+    curves: StepCurves,
 ) -> None:
     name, colour = style
     source, index = analysis.result['error_source'], AXES.index(axis)
-    time = (series.sequence - series.sequence[0]) * analysis.run.metrics.sample_time
-    reference = 1e3 * series.first[:, column('reference', index)]
+    time = (curves.sequence - curves.sequence[0]) * analysis.run.metrics.sample_time
+    reference = 1e3 * curves.first[:, column('reference', index)]
     left.plot(time, reference, color=REFERENCE, lw=0.9, ls='--')
-    envelope(left, time, series, column(source, index), 1e3, colour, name)
-    error = 1e6 * np.abs(extremes(series, column(f'{source}_error', index))).max(axis=0)
+    envelope(left, time, curves, column(source, index), 1e3, colour, name)
+    error = 1e6 * np.abs(extremes(curves, column(f'{source}_error', index))).max(axis=0)
     right.semilogy(time, np.maximum(error, FLOOR), color=colour, lw=0.9)
 
 
@@ -168,7 +168,7 @@ def _tracking_figure(
 
 def _tail(analysis: Analysis, name: str, axis: str) -> tuple[FloatArray, FloatArray]:
     """Time [s] and one column of the last tracking samples."""
-    sequence, values = analysis.series.tail
+    sequence, values = analysis.curves.tail
     time = (sequence - sequence[0]) * analysis.run.metrics.sample_time
     return time, values[:, column(name, AXES.index(axis))]
 

@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 
 from maglev_model.axes import AXES
 from maglev_monitor.bag.analysis import Analysis, analyse
-from maglev_monitor.bag.writer import BagError
-from maglev_monitor.report.units import angle_or_length, micro, seconds
+from maglev_monitor.bag.errors import BagError
+from maglev_monitor.metrics.readable import angle_or_length, micro, seconds
 from maglev_study.paper import SCENARIOS, STEPS, TRACKING, WINDOW, PublishedStep
 
 CONTROLLERS = {'paper': "the paper's law, simulated", 'ours': 'ours, simulated'}
@@ -43,7 +43,7 @@ _NOTES = (
 
 
 class Run(NamedTuple):
-    """One run of a controller: its figures and series, None where there are none; what is wrong."""
+    """One run of a controller: figures and analysis, None where there are none; what is wrong."""
 
     controller: str
     scenario: str
@@ -107,7 +107,7 @@ def markdown(runs: Sequence[Run]) -> str:
 
 def render(runs: Sequence[Run]) -> str:
     """The whole page as HTML; figures are embedded, nothing is fetched."""
-    from maglev_monitor.report.page import bullets, header, page, picture, table
+    from maglev_monitor.report.page import bullets, header, html_table, page, picture
     from maglev_study.paper_plots import paper_plots
 
     analyses: dict[str, dict[str, Analysis]] = {}
@@ -120,11 +120,11 @@ def render(runs: Sequence[Run]) -> str:
     parts = [
         header(title, 'fail' if failed else 'pass', _header_words(runs)),
         bullets('Failed', failed),
-        _html_table(runs),
+        _table_of_figures(runs),
         bullets('How to read it', _NOTES),
         *(picture(plot) for plot in paper_plots(analyses)),
         '<h2>Runs</h2>',
-        table(['run', 'verdict', 'mode', 'measured', 'peak phase current'], _run_rows(runs)),
+        html_table(['run', 'verdict', 'mode', 'measured', 'peak phase current'], _run_rows(runs)),
     ]
     return page(title, parts)
 
@@ -278,7 +278,7 @@ def _markdown_row(cells: Sequence[str]) -> str:
     return '| ' + ' | '.join(cell.replace('|', '\\|') for cell in cells) + ' |'
 
 
-def _html_table(runs: Sequence[Run]) -> str:
+def _table_of_figures(runs: Sequence[Run]) -> str:
     lines = ['<table><tr>', *(f'<th>{html.escape(head)}</th>' for head in HEADS), '</tr>']
     for row in rows(runs):
         kind, span = ('th', f' colspan="{len(HEADS)}"') if len(row) == 1 else ('td', '')

@@ -17,7 +17,7 @@ from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
 from maglev_model.parameters import ParameterError, build, read_yaml
 
-PARAMS = Path(__file__).parents[3] / 'params'
+PARAMS = Path(__file__).resolve().parents[3] / 'params'
 PERIOD = 1e-3
 HOVER = np.array([0.025, 0.0, 0.0, 0.0, 0.0])
 

@@ -20,11 +20,11 @@ from maglev_model.axes import AXES
 from maglev_model.equilibrium import equilibrium_current, equilibrium_inverse, stiffness
 from maglev_model.inverse import CurrentLimits
 from maglev_model.machine import MachineParameters, machine_constants
-from maglev_model.parameters import ParameterError, build, read_yaml
+from maglev_model.parameters import ParameterError, build, from_yaml, read_yaml, replace
 from maglev_model.platen import accelerations
 from maglev_plant.parameters import PlantParameters
 
-PARAMS = Path(__file__).parents[3] / 'params'
+PARAMS = Path(__file__).resolve().parents[3] / 'params'
 PERIOD = 1e-3
 MACHINE = machine_constants(MachineParameters())
 SHAPED = {
@@ -255,10 +255,10 @@ def test_contradictions_are_refused(law: str, overrides: dict[str, object], reas
 
 def test_a_single_motor_has_the_exact_inverse_only() -> None:
     """The others do not hold for it."""
-    found = read_yaml(PARAMS / 'single_motor.yaml', 'controller')
-    assert Regulator(build(ControllerParameters, found)).parameters.machine.motors == 1
+    single = from_yaml(ControllerParameters, 'controller', PARAMS / 'single_motor.yaml')
+    assert Regulator(single).parameters.machine.motors == 1
     with pytest.raises(ParameterError, match=r"'simplified'.*single motor has 'exact' only"):
-        Regulator(build(ControllerParameters, found | {'inverse': 'simplified'}))
+        Regulator(replace(single, {'inverse': 'simplified'}))
 
 
 def test_the_bandwidth_is_that_of_the_default_regulator() -> None:

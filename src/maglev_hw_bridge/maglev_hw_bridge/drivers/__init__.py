@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,6 +67,15 @@ class Driver(Protocol):
 
     def close(self) -> None:
         """Release the boards with outputs at 0 V; may be called twice and must not raise."""
+        ...
+
+
+@runtime_checkable
+class Truthful(Protocol):
+    """A driver of boards that are not real also tells what is behind a sample."""
+
+    def truth(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """True x1..x10 (10,) at the sample read last, and i_d, then i_q flowing (8,) [A]."""
         ...
 
 

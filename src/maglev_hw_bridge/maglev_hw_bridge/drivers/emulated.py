@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,13 +28,6 @@ def make(parameters: BridgeParameters, realtime: bool) -> EmulatedDriver:
     return EmulatedDriver(parameters, EmulatedBoards(parameters, realtime))
 
 
-class Truth(NamedTuple):
-    """What is behind a sample."""
-
-    state: NDArray[np.float64]  # (10,) x1..x10
-    current: NDArray[np.float64]  # (8,) i_d of motors 1..4, then i_q, flowing [A]
-
-
 class EmulatedDriver(QuanserDriver):
     """The Quanser driver, which on emulated boards can also tell the truth."""
 
@@ -49,10 +41,10 @@ class EmulatedDriver(QuanserDriver):
         super().start()
         self._first = self.boards.ticks
 
-    def truth(self) -> Truth:
-        """The true state of the sample read last, even where it was read late."""
-        row = self.boards.past[(self._first + self._ticks) % len(self.boards.past)]
-        return Truth(row[:10], row[10:])
+    def truth(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The truth behind the sample read last, even where it was read late; see the protocol."""
+        row = self.boards.past[(self._first + self._ticks) % len(self.boards.past)].copy()
+        return row[:10], row[10:]
 
 
 class EmulatedBoards:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,9 +13,9 @@ from rosbags.rosbag2 import Reader
 from rosbags.rosbag2.errors import ReaderError
 from rosbags.typesys import Stores, get_typestore
 
-from maglev_monitor.bag.mcap_file import McapError, McapFile, Message
-from maglev_monitor.bag.writer import BagError
-from maglev_monitor.metrics.samples import KEY_OF_MESSAGE_TYPE, Records, decode
+from maglev_monitor.bag.errors import BagError
+from maglev_monitor.bag.mcap_file import McapFile, TopicMessages
+from maglev_monitor.metrics.decoding import KEY_OF_MESSAGE_TYPE, Records, decode
 
 _DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
 _READER_BATCH = 5000  # messages handed on at once when rosbags reads
@@ -56,34 +57,31 @@ class Bag:
 
     def batches(self) -> Iterator[Batch]:
         """The bag's content in the order it was written. Raises :class:`BagError`."""
-        counts: defaultdict[str, int] = defaultdict(int)
+        self.counts = {}
         self.notes.clear()
         try:
             for messages in self._read():
-                for message in messages:
-                    counts[message.topic] += 1
+                for topic, _, data in messages:
+                    self.counts[topic] = self.counts.get(topic, 0) + len(data)
                 yield self._batch(messages)
-        except (OSError, McapError, ReaderError) as error:
+        except (OSError, ValueError, ReaderError) as error:
             raise BagError(f"cannot read the bag '{self.path}': {error}") from error
-        except ValueError as error:
-            raise BagError(f"cannot read the bag '{self.path}': {error}") from error
-        self.counts = dict(counts)
-        if not any(counts.values()):
+        if not self.counts:
             raise BagError(f"the bag '{self.path}' holds no message")
 
-    def _read(self) -> Iterator[list[Message]]:
+    def _read(self) -> Iterator[list[TopicMessages]]:
         if self._needs_rosbags():
             yield from self._read_by_rosbags()
             return
         for number, path in enumerate(self.files):
             file = McapFile(path)
-            found = 0
+            recovered = 0
             for messages in file.chunks():
-                found += len(messages)
+                recovered += sum(len(topic.data) for topic in messages)
                 yield messages
             if not file.complete:
                 self.notes.append(
-                    f"'{path.name}' is not whole, {file.damage}: {found} messages recovered"
+                    f"'{path.name}' is not whole, {file.damage}: {recovered} messages recovered"
                 )
             elif number == 0 and self.path.is_dir() and not (self.path / 'metadata.yaml').is_file():
                 self.notes.append(f"'{self.path}' has no metadata.yaml: read without it")
@@ -98,26 +96,28 @@ class Bag:
         text = metadata.read_text(encoding='utf-8', errors='replace').lower()
         return any(f'compression_mode: {mode}' in text for mode in ('message', 'file'))
 
-    def _read_by_rosbags(self) -> Iterator[list[Message]]:
+    def _read_by_rosbags(self) -> Iterator[list[TopicMessages]]:
         with Reader(self.path) as reader:
-            batch = []
-            for connection, time, data in reader.messages():
-                batch.append(Message(connection.topic, connection.msgtype, time, bytes(data)))
-                if len(batch) == _READER_BATCH:
-                    yield batch
-                    batch = []
-            yield batch
+            messages = reader.messages()
+            while batch := list(itertools.islice(messages, _READER_BATCH)):
+                by_topic: dict[tuple[str, str], list[bytes]] = {}
+                for connection, _, data in batch:
+                    topic = (connection.topic, connection.msgtype)
+                    by_topic.setdefault(topic, []).append(bytes(data))
+                yield [TopicMessages(*topic, data) for topic, data in by_topic.items()]
 
-    def _batch(self, messages: list[Message]) -> Batch:
-        samples: defaultdict[str, list[bytes]] = defaultdict(list)
+    def _batch(self, messages: Sequence[TopicMessages]) -> Batch:
+        serialized: defaultdict[str, list[bytes]] = defaultdict(list)
         diagnostics: list[Diagnostic] = []
-        for message in messages:
-            key = KEY_OF_MESSAGE_TYPE.get(message.message_type)
+        for _, message_type, data in messages:
+            key = KEY_OF_MESSAGE_TYPE.get(message_type)
             if key is not None:
-                samples[key].append(message.data)
-            elif message.message_type == _DIAGNOSTICS:
-                diagnostics += self._diagnostics(message.data)
-        return Batch({key: decode(key, data) for key, data in samples.items()}, diagnostics)
+                serialized[key] += data
+            elif message_type == _DIAGNOSTICS:
+                for message in data:
+                    diagnostics += self._diagnostics(message)
+        samples = {key: decode(key, data) for key, data in serialized.items()}
+        return Batch(samples, diagnostics)
 
     def _diagnostics(self, data: bytes) -> list[Diagnostic]:
         array: Any = self._typestore.deserialize_cdr(data, _DIAGNOSTICS)

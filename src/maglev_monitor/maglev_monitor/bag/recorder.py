@@ -21,10 +21,11 @@ from rosbags.interfaces import (
 )
 
 from maglev_model.parameters import parameter
-from maglev_monitor.bag.writer import BagError, BagWriter
+from maglev_monitor.bag.errors import BagError
+from maglev_monitor.bag.writer import BagWriter
 from maglev_node.node import MaglevNode, NodeError, NodeParameters
-from maglev_node.node import main as run_main
 from maglev_node.polling import PolledSubscription, Queues
+from maglev_node.process import main as run_main
 from maglev_node.topics import DIAGNOSTICS, SAMPLE_TOPICS
 
 TOPICS: dict[str, type] = {
@@ -98,10 +99,12 @@ class RecorderNode(MaglevNode[RecorderParameters]):
             return
         try:
             for topic, tap in self._taps.items():
-                for data, received in tap.take():
-                    if topic not in self._writer.counts:
-                        self._add_topic(topic)
-                    self._writer.write(topic, received, data)
+                messages = list(tap.take())
+                if not messages:
+                    continue
+                if topic not in self._writer.counts:
+                    self._add_topic(topic)
+                self._writer.write(topic, messages)
             now = time.monotonic()
             if now - self._flushed > self.parameters.flush_period:
                 self._flushed = now

@@ -3,29 +3,25 @@
 from __future__ import annotations
 
 import contextlib
+import errno
+import os
 import shutil
-from collections import defaultdict
-from collections.abc import Callable, Sequence
-from io import BufferedWriter, BytesIO
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, cast
+from typing import IO, cast
 
-from rosbags.interfaces import Connection, Qos
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
-from rosbags.rosbag2.errors import WriterError
-from rosbags.rosbag2.storage_mcap import McapWriter, PendingChunk
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from rosbags.typesys.store import Typestore
+from mcap.writer import CompressionType, Writer
+from rosbags.interfaces import Qos
 
-_CHUNK_BYTES = 1 << 19  # below rosbags' own 1 MiB, so that chunks are closed here
-_SPARE_BYTES = 4 << 20  # room that must be left for index and metadata
+from maglev_monitor.bag.chunk_file import ChunkFile
+from maglev_monitor.bag.definitions import Definitions, FindMessages
+from maglev_monitor.bag.errors import BagError
+from maglev_monitor.bag.rosbag2_metadata import Topic, as_yaml, bag_information, offered_qos
 
-FindMessages = Callable[[str], Path]
-"""From a package's name to the folder of its .msg files; raises LookupError."""
-
-
-class BagError(RuntimeError):
-    """The bag cannot be written or read; the message says why and what to do."""
+_CHUNK_BYTES = 1 << 18
+_SPARE_BYTES = 4 << 20  # what must be left on the disk, for other files as well
+_INDEX_BYTES = 1 << 16  # more than schemas, channels and metadata take at the end of a bag
+_INDEX_BYTES_PER_CHUNK = 1 << 9
 
 
 class BagWriter:
@@ -38,64 +34,83 @@ class BagWriter:
 
     def __init__(self, path: Path, find_messages: FindMessages, *, compress: bool = False) -> None:
         self.path = path
-        self.counts: dict[str, int] = {}
-        self._find_messages = find_messages
-        self._compress = compress
-        self._typestore: Typestore = get_typestore(Stores.ROS2_JAZZY)
-        self._connections: dict[str, Connection] = {}
-        self._writer: Writer | None = None
-        self._whole: tuple[int, dict[int, int], dict[int, int]] = (0, {}, {})
+        self._compression = CompressionType.ZSTD if compress else CompressionType.NONE
+        self._definitions = Definitions(find_messages)
+        self._schemas: dict[str, int] = {}
+        self._topics: dict[str, Topic] = {}
+        self._first, self._last = 1 << 63, 0  # times of reception [ns]
+        self._chunks = 0
+        self._file: ChunkFile | None = None
+        self._mcap: Writer | None = None
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Messages by topic."""
+        return {topic.name: topic.count for topic in self._topics.values()}
 
     def open(self) -> None:
         """Make the bag. Raises :class:`BagError` when it exists or cannot be written."""
         if self.path.exists():
             raise BagError(f"'{self.path}' exists already: give another output folder")
         try:
-            writer = Writer(self.path, version=9, storage_plugin=StoragePlugin.MCAP)
-            if self._compress:
-                writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
-            writer.open()
-            self._writer = writer
-            self._unbuffer()
-        except (OSError, WriterError) as error:
+            self.path.mkdir(parents=True)
+            self._file = ChunkFile(self.path / f'{self.path.name}_0.mcap')
+            output = cast(IO[bytes], self._file)
+            self._mcap = Writer(
+                output,
+                chunk_size=_CHUNK_BYTES,
+                compression=self._compression,
+                enable_crcs=False,  # a tenth of what a message costs
+            )
+            self._mcap.start('ros2')
+        except OSError as error:
             raise self._cannot_write(error) from error
+        self._keep()
 
     def know(self, message_type: str) -> None:
-        """Make a message type known, from ROS's own store or from .msg files.
-
-        Raises :class:`BagError` when there is no definition of it.
-        """
-        if message_type in self._typestore.types:
-            return
-        package = message_type.split('/')[0]
-        types: dict[str, Any] = {}
-        try:
-            for file in sorted(self._find_messages(package).glob('*.msg')):
-                name = f'{package}/msg/{file.stem}'
-                if name not in self._typestore.types:
-                    types.update(get_types_from_msg(file.read_text(encoding='utf-8'), name))
-            self._typestore.register(types)
-        except (OSError, LookupError) as error:
-            raise BagError(f"no definition of '{message_type}' found: {_reason(error)}") from error
-        if message_type not in self._typestore.types:
-            raise BagError(f"no definition of '{message_type}' found in package '{package}'")
+        """Make sure that a message type is known. Raises :class:`BagError` when it is not."""
+        self._definitions.of(message_type)
 
     def add_topic(self, topic: str, message_type: str, qos: Sequence[Qos] = ()) -> None:
         """Add a topic with its message definition; unknown ones raise :class:`BagError`."""
-        assert self._writer is not None
-        self.know(message_type)
-        self._connections[topic] = self._writer.add_connection(
-            topic, message_type, typestore=self._typestore, offered_qos_profiles=qos
+        assert self._mcap is not None
+        definition = self._definitions.of(message_type)
+        if message_type not in self._schemas:
+            text = definition.text.encode()
+            self._schemas[message_type] = self._mcap.register_schema(message_type, 'ros2msg', text)
+        channel = self._mcap.register_channel(
+            topic,
+            'cdr',
+            self._schemas[message_type],
+            {'offered_qos_profiles': offered_qos(qos)},
         )
-        self.counts[topic] = 0
+        self._topics[topic] = Topic(topic, message_type, definition.type_hash, qos, channel)
 
-    def write(self, topic: str, time: int, data: bytes) -> None:
-        """Write a serialized message received at a time [ns]. Raises :class:`BagError`."""
-        assert self._writer is not None
-        self._writer.write(self._connections[topic], time, data)
-        self.counts[topic] += 1
-        if self._storage().chunk.bio.tell() > _CHUNK_BYTES:
-            self.flush()
+    def write(self, topic: str, messages: Iterable[tuple[bytes, int]]) -> None:
+        """Write serialized messages of a topic, each with its time of reception [ns].
+
+        Raises :class:`BagError`, as :meth:`flush`.
+        """
+        assert self._mcap is not None
+        assert self._file is not None
+        file, add_message = self._file, self._mcap.add_message
+        channel = self._topics[topic].channel
+        count, first, last = 0, self._first, self._last
+        try:
+            for data, time in messages:
+                add_message(channel, time, data, time)
+                count += 1
+                if time < first:
+                    first = time
+                if time > last:
+                    last = time
+                if file.position != file.whole:
+                    self._keep()
+        except OSError as error:
+            raise self._break_off(error) from error
+        finally:
+            self._topics[topic].count += count
+            self._first, self._last = first, last
 
     def flush(self) -> None:
         """Hand what was written over to the system, so that it survives a kill.
@@ -103,77 +118,73 @@ class BagWriter:
         Raises :class:`BagError`, also when the disk is nearly full: the bag can still be closed
         then.
         """
-        storage = self._storage()
+        assert self._mcap is not None
         try:
-            if storage.chunk.msgs:
-                storage.close_chunk()
-            self._remember()
-            free = shutil.disk_usage(self.path).free
+            self._mcap.flush()  # type: ignore[no-untyped-call]
         except OSError as error:
-            self._go_back()
-            raise self._cannot_write(error) from error
-        if free < _SPARE_BYTES:
-            raise BagError(f"cannot write the bag '{self.path}': the disk is full")
+            raise self._break_off(error) from error
+        self._keep()
 
     def close(self) -> None:
         """Finish the bag with index and metadata; may be called twice.
 
         Raises :class:`BagError` when that fails; what was flushed can still be analysed.
         """
-        writer = self._writer
-        if writer is None:
+        file, self._file = self._file, None
+        if file is None:
             return
         try:
-            storage = self._storage()
-            if storage.chunk.msgs:
-                storage.close_chunk()
-            if not any(writer.counts.values()):
-                writer.min_timestamp = 0
-            writer.close()
+            self._finish(file)
         except OSError as error:
             with contextlib.suppress(OSError):
-                self._go_back()
-                writer.abort()
+                file.go_back()
             raise BagError(
                 f"cannot finish the bag '{self.path}': {_reason(error)}; analyze can recover it"
             ) from error
         finally:
-            self._writer = None
+            self._mcap = None
+            file.close()
 
-    def _unbuffer(self) -> None:
-        """Write chunks straight to the file: a buffer would write what failed once more, later."""
-        storage = self._storage()
-        storage.bio.close()
-        storage.bio = cast(BufferedWriter, storage.path.open('r+b', buffering=0))
-        storage.bio.seek(0, 2)
-        self._remember()
+    def _finish(self, file: ChunkFile) -> None:
+        if self._mcap is None:
+            raise OSError(errno.EIO, 'a part of it could not be written')
+        self._mcap.flush()  # type: ignore[no-untyped-call]
+        file.keep()
+        topics = list(self._topics.values())
+        first = self._first if any(topic.count for topic in topics) else 0
+        information = bag_information(file.path.name, topics, first, self._last)
+        self._mcap.add_metadata('rosbag2', {'serialized_metadata': as_yaml(information)})
+        self._mcap.finish()  # type: ignore[no-untyped-call]
+        temporary = self.path / 'metadata.yaml.tmp'
+        text = as_yaml({'rosbag2_bagfile_information': information}) + '\n'
+        temporary.write_text(text, encoding='utf-8')
+        os.replace(temporary, self.path / 'metadata.yaml')
 
-    def _remember(self) -> None:
-        """The file is whole up to here."""
-        assert self._writer is not None
-        storage = self._storage()
-        self._whole = (storage.bio.tell(), dict(self._writer.counts), dict(storage.channel_stats))
+    def _keep(self) -> None:
+        """The file is whole up to here. Is there room for the next chunk and the index?"""
+        assert self._file is not None
+        self._file.keep()
+        self._chunks += 1
+        index = _INDEX_BYTES + _INDEX_BYTES_PER_CHUNK * self._chunks
+        try:
+            free = shutil.disk_usage(self.path).free
+            self._file.claim(2 * _CHUNK_BYTES + index)
+        except OSError as error:
+            raise self._cannot_write(error) from error
+        if free < _SPARE_BYTES:
+            raise BagError(f"cannot write the bag '{self.path}': the disk is full")
 
-    def _go_back(self) -> None:
-        """Forget what could not be written, so that the bag can be closed as it was before."""
-        assert self._writer is not None
-        storage = self._storage()
-        position, counts, channel_stats = self._whole
-        storage.bio.truncate(position)
-        storage.bio.seek(position)
-        storage.chunk = PendingChunk(2**63 - 1, 0, BytesIO(), defaultdict(list))
-        self._writer.counts.update(counts)
-        storage.channel_stats.update(channel_stats)
+    def _break_off(self, error: OSError) -> BagError:
+        """End the file where it was whole: what failed is lost, and the index with it."""
+        assert self._file is not None
+        self._mcap = None
+        with contextlib.suppress(OSError):
+            self._file.go_back()
+        return self._cannot_write(error)
 
-    def _cannot_write(self, error: Exception) -> BagError:
+    def _cannot_write(self, error: OSError) -> BagError:
         return BagError(f"cannot write the bag '{self.path}': {_reason(error)}")
 
-    def _storage(self) -> McapWriter:
-        assert self._writer is not None
-        return cast(McapWriter, self._writer.storage)
 
-
-def _reason(error: Exception) -> str:
-    if isinstance(error, OSError) and error.strerror:
-        return error.strerror.lower()
-    return str(error)
+def _reason(error: OSError) -> str:
+    return (error.strerror or str(error)).lower()

@@ -12,18 +12,18 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from maglev_model.parameters import parameter
-from maglev_monitor.bag.analysis import ERROR, RUN_KEY, write_metrics
 from maglev_monitor.live.progress import Progress
-from maglev_monitor.live.watch import Watch
+from maglev_monitor.live.silence import SilenceWatch
+from maglev_monitor.metrics.decoding import DecodeError, decode
 from maglev_monitor.metrics.joiner import Joiner
+from maglev_monitor.metrics.result_file import write_metrics
 from maglev_monitor.metrics.run_metrics import RunMetrics
-from maglev_monitor.metrics.samples import DecodeError, decode
-from maglev_monitor.metrics.settings import RunParameters, run_to_json
-from maglev_monitor.report.table import table
+from maglev_monitor.metrics.run_parameters import FAULT_LEVEL, RUN_KEY, RunParameters, run_to_json
+from maglev_monitor.report.terminal import as_text
 from maglev_node import topics
 from maglev_node.node import MaglevNode, NodeError, NodeParameters
-from maglev_node.node import main as run_main
 from maglev_node.polling import PolledSubscription, Queues
+from maglev_node.process import main as run_main
 from maglev_node.stamp import seconds
 
 KEYS = {
@@ -64,12 +64,11 @@ class MonitorNode(MaglevNode[MonitorParameters]):
     def __init__(self) -> None:
         super().__init__('monitor', MonitorParameters)
         self._check_output()
-        settings = self.parameters.metrics
         self._joiner = Joiner()
-        self._metrics = RunMetrics(settings)
+        self._metrics = RunMetrics(self.parameters)
         self._waiting_since = time.monotonic()
-        self._watch = Watch(self._waiting_since)
-        self._progress = Progress(settings)
+        self._watch = SilenceWatch(self._waiting_since)
+        self._progress = Progress(self.parameters)
         self._run_json = run_to_json(self.parameters)
         self._conclude_at: float | None = None
         self._concluded = False
@@ -178,7 +177,7 @@ class MonitorNode(MaglevNode[MonitorParameters]):
 
     def _on_diagnostics(self, message: Any) -> None:
         for status in message.status:
-            if status.level[0] < ERROR or status.name == self.get_name() or self._concluded:
+            if status.level[0] < FAULT_LEVEL or status.name == self.get_name() or self._concluded:
                 continue
             stamp = round(seconds(message.header.stamp) * 1e9)
             self._metrics.add_fault(stamp, status.name, status.message)
@@ -201,7 +200,7 @@ class MonitorNode(MaglevNode[MonitorParameters]):
         self._concluded = True
         for block in self._joiner.finish():
             self._progress.add(self._metrics.add(block))
-        result = self._metrics.result(self.parameters)
+        result = self._metrics.result()
         self._verdict = result['verdict']
         if self.parameters.output:
             try:
@@ -209,7 +208,7 @@ class MonitorNode(MaglevNode[MonitorParameters]):
             except OSError as error:
                 self.fail(f"cannot write '{self.parameters.output}': {error.strerror}")
         if self._metrics.started:
-            print(table(result), flush=True)
+            print(as_text(result), flush=True)
 
 
 def main() -> None:

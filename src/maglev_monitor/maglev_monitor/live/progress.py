@@ -8,16 +8,16 @@ import numpy as np
 
 from maglev_model.axes import AXES
 from maglev_model.phases import Phase
-from maglev_monitor.metrics.run_metrics import positions
-from maglev_monitor.metrics.samples import Records
-from maglev_monitor.metrics.settings import MetricsParameters
+from maglev_monitor.metrics.decoding import Records
+from maglev_monitor.metrics.derived import positions
+from maglev_monitor.metrics.run_parameters import RunParameters
 
 
 class Progress:
     """Stage time, real-time factor, phase and mean |e| of the newest block."""
 
-    def __init__(self, settings: MetricsParameters) -> None:
-        self._settings = settings
+    def __init__(self, run: RunParameters) -> None:
+        self._sample_time, self._radius = run.metrics.sample_time, run.machine.radius
         self._latest: Records | None = None
         self._before: tuple[int, float] | None = None
         self._values: dict[str, object] = {}
@@ -38,11 +38,11 @@ class Progress:
         :param phase: phase of the newest block of the run.
         :param now: time on a steady clock [s].
         """
-        stage_time = max(sequence, 0) * self._settings.sample_time
+        stage_time = max(sequence, 0) * self._sample_time
         before, self._before = self._before, (sequence, now)
         factor = 0.0
         if before is not None and now > before[1]:
-            factor = (sequence - before[0]) * self._settings.sample_time / (now - before[1])
+            factor = (sequence - before[0]) * self._sample_time / (now - before[1])
         name = Phase(phase).name if phase <= max(Phase) else str(phase)
         errors = self._errors()
         self._values = {
@@ -62,7 +62,7 @@ class Progress:
         if self._latest is None:
             return [float('nan')] * len(AXES)
         rows = self._latest[self._latest['has_reference']]
-        error = np.abs(positions(rows, self._settings.radius) - rows['reference'][:, None, :])
+        error = np.abs(positions(rows, self._radius) - rows['reference'][:, None, :])
         source = 0 if rows['has_plant'].any() else 1
         known = error[~np.isnan(error[:, source, 0]), source]
         if not len(known):

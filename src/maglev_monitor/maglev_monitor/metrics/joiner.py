@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from maglev_model.phases import Phase
-from maglev_monitor.metrics.samples import TOPIC_TYPES, Records, stamps
+from maglev_monitor.metrics.decoding import TOPIC_TYPES, Records, stamps
 
 _COLUMNS: dict[str, tuple[tuple[str, str], ...]] = {
     'reference': (

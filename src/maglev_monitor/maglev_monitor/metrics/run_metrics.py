@@ -15,57 +15,25 @@ from numpy.typing import NDArray
 
 from maglev_model.axes import AXES
 from maglev_model.phases import Phase
-from maglev_monitor.metrics.samples import TOPIC_TYPES, Records, outputs_from_gaps
-from maglev_monitor.metrics.settings import MetricsParameters, RunParameters
+from maglev_monitor.metrics.decoding import TOPIC_TYPES, Records
+from maglev_monitor.metrics.derived import SOURCES, phase_currents, positions
+from maglev_monitor.metrics.run_parameters import RunParameters
 from maglev_monitor.metrics.step_response import StepTracker
 from maglev_monitor.metrics.verdict import verdict
 
 FloatArray = NDArray[np.float64]
 
-SOURCES = ('true', 'measured')
-_OUTPUT_STATES = [0, 2, 4, 6, 8]  # x1, x3, x5, x7, x9 of Table II
 _OPTIONAL = ('controller', 'plant')  # a stage or controller may do without
 _TICK_RESOLUTION = 1e-6  # of the tick histogram [s]
 _TICK_BINS = 200_000
-_PHASE_SHIFTS = np.array([0.0, 2.0, 4.0]) * np.pi / 3.0
 _RUNNING = (Phase.LIFT_OFF, Phase.HOLD, Phase.TRACK, Phase.STEP, Phase.LAND)
-
-
-def positions(rows: Records, radius: float) -> FloatArray:
-    """Outputs by source (true, measured) [m, rad], NaN where unknown, shape (n, 2, 5)."""
-    found = np.full((len(rows), 2, 5), np.nan)
-    plant = rows['has_plant']
-    found[plant, 0] = rows['state'][plant][:, _OUTPUT_STATES]
-    measured = rows['has_measurement']
-    some = rows[measured]
-    found[measured, 1] = outputs_from_gaps(some['gap'], some['x'], some['z'], radius)
-    return found
-
-
-def phase_currents(rows: Records, pole_pitch: float) -> FloatArray:
-    """Currents in the three phases of the four motors by the inverse Park transform,
-    amplitude-invariant.
-
-    The electrical angle is pi s / tau, s the displacement along the motor: z for motors 1 and 3, x
-    for 2 and 4.
-
-    :param rows: joined rows that have currents and measurement, shape (n,).
-    :param pole_pitch: tau [m].
-    :returns: shape (n, 4, 3) [A].
-    """
-    displacement = np.stack([rows['z'], rows['x'], rows['z'], rows['x']], axis=1)
-    angle = (np.pi / pole_pitch * displacement)[:, :, None] - _PHASE_SHIFTS
-    direct = rows['direct_current'][:, :, None]
-    quadrature = rows['quadrature_current'][:, :, None]
-    currents: FloatArray = direct * np.cos(angle) - quadrature * np.sin(angle)
-    return currents
 
 
 class RunMetrics:
     """Takes the blocks of :class:`maglev_monitor.metrics.joiner.Joiner` and yields the figures."""
 
-    def __init__(self, settings: MetricsParameters) -> None:
-        self._settings = settings
+    def __init__(self, run: RunParameters) -> None:
+        self._run = run
         self.started = False
         self.ended = False
         self.phase: int = Phase.REST
@@ -80,7 +48,7 @@ class RunMetrics:
         self._segment: int | None = None
         self._target: FloatArray | None = None
         self._step: StepTracker | None = None
-        self._currents = _Currents(settings.pole_pitch)
+        self._currents = _Currents(run.machine.pole_pitch)
         self._timing = _Timing()
         self._faults: dict[str, tuple[int, str]] = {}
         self._end_stamp: int | None = None
@@ -126,14 +94,15 @@ class RunMetrics:
         if known is None or stamp < known[0]:
             self._faults[node] = (stamp, message)
 
-    def result(self, run: RunParameters) -> dict[str, Any]:
+    def result(self) -> dict[str, Any]:
         """The content of ``metrics.json``; complete only when the run has reached its end."""
-        source = 0 if self._seen['plant'] else 1
+        run, source = self._run, 0 if self._seen['plant'] else 1
+        sample_time = run.metrics.sample_time
         found: dict[str, Any] = {
             'scenario': run.scenario,
             'stage': run.stage,
             'mode': run.mode,
-            'duration': self._measured_samples * self._settings.sample_time,
+            'duration': self._measured_samples * sample_time,
             'samples': self._measured_samples,
             'run_samples': self._run_rows,
             **self._missing_result(),
@@ -141,7 +110,7 @@ class RunMetrics:
             'axes': self._tracking.result(source),
             'steps': [entry for step in self._steps for entry in step.results(source)],
             'currents': self._currents.result(),
-            'timing': self._timing.result(self._settings.sample_time),
+            'timing': self._timing.result(sample_time),
             'faults': self._fault_result(),
         }
         return {**found, **verdict(found, run.limits, complete=self.ended)}
@@ -184,7 +153,7 @@ class RunMetrics:
             present = int(np.count_nonzero(rows[f'has_{key}']))
             self._seen[key] += present
             self._missing[key] += len(rows) - present
-        position = positions(rows, self._settings.radius)
+        position = positions(rows, self._run.machine.radius)
         referenced = rows['has_reference']
         if np.any(referenced):
             self._last_reference = int(rows['sequence'][referenced][-1])
@@ -216,7 +185,7 @@ class RunMetrics:
         self._target = target
         self._step = None
         if row['phase'] == Phase.STEP and (target != start).any():
-            self._step = StepTracker(self._settings, start, target, int(row['sequence']))
+            self._step = StepTracker(self._run.metrics, start, target, int(row['sequence']))
             self._steps.append(self._step)
 
 
@@ -243,16 +212,21 @@ class _Tracking:
 
     def result(self, source: int) -> dict[str, dict[str, float | None]]:
         count = int(self._count[source])
-        table: dict[str, dict[str, float | None]] = {}
+        by_axis: dict[str, dict[str, float | None]] = {}
         for index, axis in enumerate(AXES):
-            table[axis] = {
-                'mean_abs_error': float(self._sum[source, index] / count) if count else None,
-                'rms_error': float(np.sqrt(self._squares[source, index] / count))
+            by_axis[axis] = {
+                'mean_abs_error': _known(self._sum[source, index] / count) if count else None,
+                'rms_error': _known(np.sqrt(self._squares[source, index] / count))
                 if count
                 else None,
-                'max_abs_error': float(self._max[source, index]) if count else None,
+                'max_abs_error': _known(self._max[source, index]) if count else None,
             }
-        return table
+        return by_axis
+
+
+def _known(value: float) -> float | None:
+    """A figure, or None where a tilt could not be made out."""
+    return None if np.isnan(value) else float(value)
 
 
 class _Currents:

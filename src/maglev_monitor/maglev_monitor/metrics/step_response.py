@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maglev_model.axes import AXES
-from maglev_monitor.metrics.settings import MetricsParameters
+from maglev_monitor.metrics.run_parameters import MetricsParameters
 
 FloatArray = NDArray[np.float64]
 
@@ -49,8 +49,9 @@ class StepTracker:
             if known[:, source].any():
                 self._last[source] = sequence[known[:, source]][-1]
         magnitude = np.abs(error)
+        unknown = np.isnan(magnitude) & known[:, :, None]  # a tilt that cannot be
         for index, bound in enumerate(self._bounds):
-            outside = magnitude > bound
+            outside = (magnitude > bound) | unknown
             row = len(outside) - 1 - outside[::-1].argmax(axis=0)
             latest = np.where(outside.any(axis=0), sequence[row], self._first - 1)
             self._last_outside[index] = np.maximum(self._last_outside[index], latest)

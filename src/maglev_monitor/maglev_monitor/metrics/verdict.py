@@ -7,11 +7,11 @@ from typing import Any
 
 from maglev_model.axes import AXES
 from maglev_model.parameters import values
-from maglev_monitor.metrics.settings import Limits
-from maglev_monitor.report.units import angle_or_length, number
+from maglev_monitor.metrics.readable import angle_or_length, number
+from maglev_monitor.metrics.run_parameters import RunLimits
 
 
-def verdict(found: Mapping[str, Any], limits: Limits, *, complete: bool) -> dict[str, Any]:
+def verdict(found: Mapping[str, Any], limits: RunLimits, *, complete: bool) -> dict[str, Any]:
     """The last part of ``metrics.json``: verdict, its reasons and the limits that were checked.
 
     :param found: the figures, as :meth:`~.run_metrics.RunMetrics.result` gathers them.
@@ -29,7 +29,7 @@ def verdict(found: Mapping[str, Any], limits: Limits, *, complete: bool) -> dict
     return {'verdict': word, 'reasons': reasons, 'limits': checked_limits(limits)}
 
 
-def checked_limits(limits: Limits) -> dict[str, Any]:
+def checked_limits(limits: RunLimits) -> dict[str, Any]:
     """The limits that are checked, by name; limits by axis as a mapping."""
     checked: dict[str, Any] = {}
     for name, value in values(limits).items():
@@ -42,7 +42,7 @@ def checked_limits(limits: Limits) -> dict[str, Any]:
     return checked
 
 
-def _axis_reasons(found: Mapping[str, Any], limits: Limits) -> Iterator[str]:
+def _axis_reasons(found: Mapping[str, Any], limits: RunLimits) -> Iterator[str]:
     rows = (
         ('mean_abs_error', 'mean |e|', limits.max_mean_error),
         ('max_abs_error', 'largest |e|', limits.max_error),
@@ -61,7 +61,7 @@ def _axis_reasons(found: Mapping[str, Any], limits: Limits) -> Iterator[str]:
                 yield f'{title} of {axis} is {shown}, allowed is {allowed}'
 
 
-def _step_reasons(found: Mapping[str, Any], limits: Limits) -> Iterator[str]:
+def _step_reasons(found: Mapping[str, Any], limits: RunLimits) -> Iterator[str]:
     for step in found['steps']:
         axis = step['axis']
         start, target = angle_or_length(axis, step['from']), angle_or_length(axis, step['to'])
@@ -80,7 +80,7 @@ def _step_reasons(found: Mapping[str, Any], limits: Limits) -> Iterator[str]:
             yield f'{name}: {symbol} is {shown}, allowed is {number(bound)} s'
 
 
-def _other_reasons(found: Mapping[str, Any], limits: Limits) -> Iterator[str]:
+def _other_reasons(found: Mapping[str, Any], limits: RunLimits) -> Iterator[str]:
     factor = found['timing']['real_time_factor'] or 0.0
     upper = (
         ('peak phase current', found['currents']['peak_phase'], limits.max_phase_current, ' A'),

@@ -15,8 +15,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from maglev_monitor.report.curves import COLUMNS
-from maglev_monitor.report.envelope import Series
+from maglev_monitor.metrics.curves import COLUMNS
+from maglev_monitor.metrics.envelope import Envelope
 
 FloatArray = NDArray[np.float64]
 
@@ -70,19 +70,19 @@ def units(axis: str) -> tuple[str, str]:
     return ('mrad', 'µrad') if axis in ('phi', 'theta') else ('mm', 'µm')
 
 
-def extremes(series: Series, column: int) -> FloatArray:
-    return np.stack([series.low[:, column], series.high[:, column]])
+def extremes(curve: Envelope, column: int) -> FloatArray:
+    return np.stack([curve.low[:, column], curve.high[:, column]])
 
 
 def envelope(
     panel: Axes,
     time: FloatArray,
-    series: Series,
+    curve: Envelope,
     column: int,
     scale: float,
     colour: object,
     label: str,
 ) -> None:
     """One line through least and greatest values in turn, so that every peak is drawn."""
-    both = np.stack([series.low[:, column], series.high[:, column]], axis=1) * scale
+    both = np.stack([curve.low[:, column], curve.high[:, column]], axis=1) * scale
     panel.plot(np.repeat(time, 2), both.ravel(), color=colour, lw=1.0, label=label)

@@ -70,7 +70,7 @@ def picture(plot: Plot) -> str:
     )
 
 
-def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+def html_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """A table of plain text."""
     head = ''.join(f'<th>{html.escape(name)}</th>' for name in heads)
     body = ''.join(

@@ -8,20 +8,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from maglev_model.axes import AXES, THETA, FloatArray, X, Y
 from maglev_study.comparison.contestants import Contestant
-from maglev_study.comparison.flight import (
-    ENCODER,
-    HOVER,
-    SETTLED,
-    THETA,
-    Flight,
-    FloatArray,
-    Step,
-    X,
-    Y,
-    ellipse,
-    judge,
-)
+from maglev_study.comparison.flight import ENCODER, SETTLED, Flight, Step, judge
+from maglev_study.references import HOVER, ellipse
 
 DISTURBANCE: Mapping[str, object] = {
     'disturbance__constant': (10.0, 10.0, 10.0, 1.0, 1.0),
@@ -65,10 +55,9 @@ class StepExperiment:
     @property
     def title(self) -> str:
         """As the table's row is called."""
-        name = ('y', 'x', 'z', 'phi', 'theta')[self.axis]
         unit = 'mrad' if self.axis >= 3 else 'mm'
         shape = f', in {self.time:g} s' if self.time else ''
-        return f'{name} {1e3 * self.start:g} -> {1e3 * self.end:g} {unit}{shape}'
+        return f'{AXES[self.axis]} {1e3 * self.start:g} -> {1e3 * self.end:g} {unit}{shape}'
 
 
 SMALL_STEPS = (
@@ -83,6 +72,9 @@ LARGE_STEPS = (
     StepExperiment(THETA, 0.0, 0.010),
 )
 SHAPED_STEPS = tuple(dataclasses.replace(step, time=0.2) for step in LARGE_STEPS)
+
+GROW = 2.0
+"""Time in which the ellipse grows from standing still [s]."""
 
 LOST, NOT_SETTLED, NONE = 'lost', 'unsettled', '-'
 
@@ -187,7 +179,7 @@ def _ellipse_row(
     worst, lost = np.zeros(5), 0
     for plant in plants:
         flight = Flight(contestant, **plant)
-        references = ellipse(10.0 + measured, theta, flight.period)
+        references = ellipse(10.0 + measured, theta, flight.period, grow=GROW)
         outcome = flight.follow(references)
         if outcome is None:
             lost += 1

@@ -11,16 +11,11 @@ from numpy.typing import NDArray
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import MeasurementFault, Regulator
+from maglev_model.axes import PHI, FloatArray, Y
 from maglev_plant.simulation import SimulatedStage
-from maglev_study.closed_loop import References, Run, run
+from maglev_study.closed_loop import Run, run
 from maglev_study.comparison.contestants import Contestant
-
-FloatArray = NDArray[np.float64]
-
-Y, X, Z, PHI, THETA = range(5)
-HOVER = np.array([0.025, 0.0, 0.0, 0.0, 0.0])
-OMEGA = 1.5 * math.pi
-"""ω0 of the ellipse [rad/s]."""
+from maglev_study.references import HOVER, References, held, shaped
 
 SETTLED = 1e-4
 """Error below which a step has settled [m, rad], the paper's t_s."""
@@ -83,14 +78,12 @@ class Flight:
 
     def save(self) -> tuple[NDArray[Any], ...]:
         """All that changes with time, for :meth:`restore`."""
-        arrays = self.stage.arrays
-        return arrays.memory.copy(), arrays.command.copy(), *self.regulator.save()
+        return self.stage.arrays.block.copy(), *self.regulator.save()
 
     def restore(self, saved: tuple[NDArray[Any], ...]) -> None:
         """Go back to what was saved."""
-        arrays = self.stage.arrays
-        arrays.memory[:], arrays.command[:] = saved[:2]
-        self.regulator.restore(saved[2:])
+        self.stage.arrays.block[:] = saved[0]
+        self.regulator.restore(saved[1:])
 
     def step(self, begin: FloatArray, target: FloatArray, time: float, hold: float) -> Run | None:
         """A step from the set-point ``begin`` to ``target`` (5,), raw for ``time`` 0 [s].
@@ -102,46 +95,6 @@ class Flight:
         if time > 0.0:
             return self.follow(shaped(begin, target, time, hold - time, self.period))
         return self.follow(held(target, hold, self.period))
-
-
-def held(position: FloatArray, duration: float, period: float) -> References:
-    """A set-point (5,) held for ``duration`` [s]."""
-    n = round(duration / period)
-    return References(np.tile(position, (n, 1)), np.zeros((n, 5)), np.zeros((n, 5)))
-
-
-def shaped(
-    start: FloatArray, goal: FloatArray, time: float, hold: float, period: float
-) -> References:
-    """Minimum-jerk from one set-point to another in ``time`` [s], then held."""
-    s = np.minimum(period * np.arange(round((time + hold) / period)) / time, 1.0)[:, None]
-    way = goal - start
-    return References(
-        start + way * (10 * s**3 - 15 * s**4 + 6 * s**5),
-        way / time * (30 * s**2 - 60 * s**3 + 30 * s**4),
-        way / time**2 * (60 * s - 180 * s**2 + 120 * s**3),
-    )
-
-
-def ellipse(duration: float, theta: float, period: float) -> References:
-    """The paper's ellipse for ``duration`` [s], grown from 25 mm in the first two seconds.
-
-    In 3DOF with ``theta`` 0, in 4DOF with 0.01 rad.
-    """
-    grow = 2.0
-    amplitude = np.array([0.005, 0.03, 0.03, 0.0, theta])
-    time = period * np.arange(round(duration / period))[:, None]
-    angle = OMEGA * time + np.array([-math.pi / 2, -math.pi / 2, 0.0, 0.0, 0.0])
-    s = np.minimum(time / grow, 1.0)
-    scale = 10 * s**3 - 15 * s**4 + 6 * s**5
-    rate = (30 * s**2 - 60 * s**3 + 30 * s**4) / grow
-    bend = (60 * s - 180 * s**2 + 120 * s**3) / grow**2
-    sine, cosine = amplitude * np.sin(angle), amplitude * OMEGA * np.cos(angle)
-    return References(
-        HOVER + scale * sine,
-        rate * sine + scale * cosine,
-        bend * sine + 2.0 * rate * cosine - scale * OMEGA**2 * sine,
-    )
 
 
 def judge(response: FloatArray, start: float, end: float, bound: float, period: float) -> Step:

@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from maglev_controller.laws import control_law, find_law
+from maglev_model.axes import THETA, X, Y
 from maglev_model.parameters import ParameterError, replace
 from maglev_study.closed_loop import warm_up
 from maglev_study.comparison.contestants import Contestant, find_contestants
 from maglev_study.comparison.experiments import Row, loops, steps, tracking
-from maglev_study.comparison.flight import THETA, X, Y
 from maglev_study.comparison.region import Region, region
 from maglev_study.comparison.table import table, to_json
 

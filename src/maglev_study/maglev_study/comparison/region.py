@@ -7,17 +7,10 @@ import math
 
 import numpy as np
 
+from maglev_model.axes import THETA, FloatArray, X, Y
 from maglev_study.comparison.contestants import Contestant
-from maglev_study.comparison.flight import (
-    HOVER,
-    SETTLED,
-    THETA,
-    Flight,
-    FloatArray,
-    X,
-    Y,
-    judge,
-)
+from maglev_study.comparison.flight import SETTLED, Flight, judge
+from maglev_study.references import HOVER
 
 LOST = math.inf
 NOT_SETTLED = -1.0

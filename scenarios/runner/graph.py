@@ -1,0 +1,74 @@
+"""The nodes of the graph: their programs and arguments, the order in which they start and end."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+from runner.overlays import PARAMS
+from runner.process import program
+
+START_ORDER = ('recorder', 'monitor', 'stage', 'controller', 'reference')
+STOP_ORDER = ('reference', 'controller', 'stage', 'monitor', 'recorder')
+"""First no current flows, then the stage ends, then who watches."""
+
+
+class Scenario(NamedTuple):
+    """What is flown: parameter files of params/ over the nodes' own, arguments of the reference."""
+
+    name: str
+    files: tuple[str, ...]
+    reference: tuple[str, ...] = ()
+
+
+class Flight(NamedTuple):
+    """A scenario as the user wants it. ``duration`` is a text [s], empty for the scenario's own."""
+
+    scenario: Scenario
+    out: Path
+    stage: str = 'plant'
+    mode: str = 'lockstep'
+    duration: str = ''
+    overlays: tuple[str, ...] = ()
+
+    def program(self, node: str) -> list[str]:
+        """How to run a node; raises WrongUseError when it is not built."""
+        name = self._name(node)
+        return program('maglev_monitor' if name == 'recorder' else f'maglev_{name}', name)
+
+    def arguments(self, node: str) -> list[str]:
+        """What a node is told: parameter files, each over the one before, then single values."""
+        name = self._name(node)
+        files = [
+            *(str(PARAMS / file) for file in ('machine.yaml', f'{name}.yaml')),
+            *(str(PARAMS / file) for file in self.scenario.files),
+            *self.overlays,
+        ]
+        arguments = ['--ros-args', '--disable-external-lib-logs']
+        for file in files:
+            if Path(file).is_file():
+                arguments += ['--params-file', file]
+        for value in (f'effective_parameters:={self.out}/params/{name}.yaml', *self._values(node)):
+            arguments += ['-p', value]
+        return arguments
+
+    def _name(self, node: str) -> str:
+        return self.stage if node == 'stage' else node
+
+    def _values(self, node: str) -> list[str]:
+        if node == 'recorder':
+            return [f'output:={self.out}/bag']
+        mode = f'mode:={self.mode}'
+        if node == 'monitor':
+            output = f'output:={self.out}/metrics.json'
+            scenario = f'scenario:={self.scenario.name}'
+            return ['exit_at_end:=true', output, scenario, f'stage:={self.stage}', mode]
+        values = [mode, 'watchers:=2']
+        if node == 'reference':
+            values += ['autostart:=true', 'exit_at_end:=false']
+            if self.mode == 'realtime':
+                values.append('lead:=128')  # for when the machine holds it up
+            values += self.scenario.reference
+            if self.duration:
+                values.append(f'duration:={self.duration}')
+        return values

@@ -1,0 +1,43 @@
+"""The user's own parameter files, laid over those of a scenario."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from runner.options import WrongUseError
+
+ROOT = Path(__file__).resolve().parents[2]
+PARAMS = ROOT / 'params'
+SECTIONS = ('plant', 'hw_bridge', 'controller', 'reference', 'monitor', 'recorder', '**')
+
+
+def overlay(option: str, name: str) -> str:
+    """The path of a file in the current folder or in params/, there also without ``.yaml``."""
+    for path in (Path(name), PARAMS / name, PARAMS / f'{name}.yaml'):
+        if path.is_file():
+            break
+    else:
+        raise WrongUseError(f"{option}: there is no file '{name}', here or in {PARAMS}")
+    if not os.access(path, os.R_OK):
+        raise WrongUseError(f"{option}: cannot read '{path}'")
+    return str(path.resolve())
+
+
+def check_overlay(path: str) -> None:
+    """Refuse a file that no node would take, or that speaks to none. Needs the environment."""
+    import yaml  # these two take as long to load as all else
+
+    from maglev_model.parameters import ParameterError, read_yaml
+
+    try:
+        read_yaml(path, '')
+    except ParameterError as error:
+        raise WrongUseError(f'--params: {error}') from error
+    content = yaml.compose(Path(path).read_text(encoding='utf-8'), Loader=yaml.SafeLoader)
+    for key, _ in content.value if content else ():
+        if key.value.lstrip('/') not in SECTIONS:
+            raise WrongUseError(
+                f"--params: '{path}' has parameters for '{key.value}',"
+                ' which is no node of a scenario'
+            )

@@ -1,0 +1,144 @@
+"""One run of the graph, from its folder to its report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from runner.console import complain, say
+from runner.folder import make_folder, say_where
+from runner.graph import START_ORDER, STOP_ORDER, Flight
+from runner.overlays import check_overlay
+from runner.process import NOT_OURS, Process, last_words, program, run_to_end
+from runner.signals import Signals
+
+
+def fly(flight: Flight, signals: Signals) -> int:
+    """Fly and leave the run in its folder.
+
+    Returns 0 when it passed, 1 when not, 128 + N when signal N ended it. Raises WrongUseError
+    before anything is started.
+    """
+    for path in flight.overlays:
+        check_overlay(path)
+    commands = {node: flight.program(node) for node in START_ORDER}
+    analyze = program('maglev_monitor', 'analyze')
+    flight = flight._replace(out=make_folder(flight.out))
+    name = flight.scenario.name
+    say(f'{name}: {flight.stage}, {flight.mode}, into {flight.out}')
+    run = Run(flight, signals)
+    try:
+        passed = run.measure(commands) and not signals.code and run.judge(analyze)
+    except OSError as error:
+        complain(f'{name}: failed: {error}')
+        passed = False
+    if signals.code:
+        complain(f'{name}: interrupted; what was recorded is kept:')
+    else:
+        say(f'{name}: {"passed" if passed else "FAILED"}')
+    say_where(flight.out)
+    return signals.code or int(not passed)
+
+
+class Run:
+    """The nodes of one run while they live."""
+
+    def __init__(self, flight: Flight, signals: Signals) -> None:
+        self._flight = flight
+        self._name, self._out = flight.scenario.name, flight.out
+        self._signals = signals
+        self._nodes: dict[str, Process] = {}
+        self._progress = Progress(self._log('monitor'))
+
+    def measure(self, commands: Mapping[str, Sequence[str]]) -> bool:
+        """Whether the nodes lived until the monitor came to its end, and no signal came before.
+
+        Raises OSError when one cannot be started. However it goes, none lives on.
+        """
+        try:
+            for node in START_ORDER:
+                if self._signals.code:
+                    return False
+                command = [*commands[node], *self._flight.arguments(node)]
+                self._nodes[node] = Process(command, self._log(node))
+            return self._watch()
+        finally:
+            for node in STOP_ORDER:
+                if node in self._nodes:
+                    self._nodes[node].stop(self._pause)
+            self._progress.show(rest=True)
+
+    def judge(self, analyze: Sequence[str]) -> bool:
+        """Whether the nodes ended cleanly, there is a report, and the limits are kept."""
+        clean, reported = self._clean_ends(), self._report(analyze)
+        return clean and reported and self._nodes['monitor'].code == 0
+
+    def _watch(self) -> bool:
+        while not self._signals.code:
+            self._pause(0.1)
+            ended = [node for node, process in self._nodes.items() if process.code is not None]
+            measured = (self._out / 'metrics.json').is_file()
+            early = [node for node in ended if node != 'monitor' or not measured]
+            for node in early:
+                words = last_words(self._log(node)) or 'it said nothing'
+                code = self._nodes[node].code
+                self._complain(f'failed: {node} ended early with exit code {code}: {words}')
+                self._complain(f'its log: {self._log(node)}')
+            if ended:
+                return not early
+        return False
+
+    def _clean_ends(self) -> bool:
+        clean = True
+        for node in STOP_ORDER:
+            code = self._nodes[node].code
+            if node != 'monitor' and code not in (0, 130):
+                words = last_words(self._log(node))
+                self._complain(f'failed: {node} did not end cleanly, exit code {code}: {words}')
+                clean = False
+        return clean
+
+    def _report(self, analyze: Sequence[str]) -> bool:
+        log, report = self._log('analyze'), self._out / 'report.html'
+        command = [*analyze, f'{self._out}/bag', '--out', str(self._out)]
+        code = run_to_end(command, self._signals, log)
+        if code is None:
+            return False
+        if code > 1 or not report.is_file() or not report.stat().st_size:
+            lines = log.read_text(errors='replace').splitlines() or ['']
+            self._complain(f'failed: no report: {lines[-1]}')
+            return False
+        return True
+
+    def _log(self, node: str) -> Path:
+        return self._out / 'log' / f'{node}.log'
+
+    def _pause(self, duration: float) -> None:
+        self._signals.pause(duration)
+        self._progress.show()
+
+    def _complain(self, text: str) -> None:
+        complain(f'{self._name}: {text}')
+
+
+class Progress:
+    """Shows what the monitor says, line by line as it comes."""
+
+    def __init__(self, log: Path) -> None:
+        self._log = log
+        self._position = 0
+
+    def show(self, rest: bool = False) -> None:
+        """Print the lines that have come since; at the end, the rest without a line's end too."""
+        try:
+            with self._log.open('rb') as file:
+                file.seek(self._position)
+                new = file.read()
+        except FileNotFoundError:
+            return
+        if not rest:
+            new = new[: new.rfind(b'\n') + 1]
+        self._position += len(new)
+        for line in new.decode(errors='replace').splitlines():
+            if not line.startswith(NOT_OURS):
+                say(line)

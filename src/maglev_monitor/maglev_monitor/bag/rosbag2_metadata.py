@@ -1,0 +1,96 @@
+"""What rosbag2 wants to know of a bag: its record of the bag, version 9, and QoS. No ROS here."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import yaml
+from rosbags.interfaces import Qos, QosTime
+
+_VERSION = 9
+_DISTRIBUTION = 'jazzy'
+
+
+@dataclasses.dataclass
+class Topic:
+    """A topic of a bag."""
+
+    name: str
+    message_type: str
+    type_hash: str
+    qos: Sequence[Qos]
+    channel: int
+    count: int = 0
+
+
+def bag_information(
+    file_name: str, topics: Sequence[Topic], first: int, last: int
+) -> dict[str, Any]:
+    """``rosbag2_bagfile_information`` of a bag with one mcap file.
+
+    ``first`` and ``last`` are the least and the greatest time of reception [ns].
+    """
+    span = {
+        'starting_time': {'nanoseconds_since_epoch': first},
+        'duration': {'nanoseconds': last - first},
+        'message_count': sum(topic.count for topic in topics),
+    }
+    return {
+        'version': _VERSION,
+        'storage_identifier': 'mcap',
+        'relative_file_paths': [file_name],
+        **span,
+        'topics_with_message_count': [
+            {
+                'topic_metadata': {
+                    'name': topic.name,
+                    'type': topic.message_type,
+                    'serialization_format': 'cdr',
+                    'offered_qos_profiles': [_profile(qos) for qos in topic.qos],
+                    'type_description_hash': topic.type_hash,
+                },
+                'message_count': topic.count,
+            }
+            for topic in topics
+        ],
+        'compression_format': '',  # chunks are the file's own matter
+        'compression_mode': '',
+        'files': [{'path': file_name, **span}],
+        'custom_data': None,
+        'ros_distro': _DISTRIBUTION,
+    }
+
+
+def offered_qos(profiles: Sequence[Qos]) -> str:
+    """QoS profiles as YAML, for a channel of the file."""
+    return as_yaml([_profile(qos) for qos in profiles])
+
+
+def as_yaml(content: Mapping[str, Any] | Sequence[Any]) -> str:
+    """YAML with nothing folded and no aliases."""
+    return yaml.dump(content, Dumper=_Dumper, default_flow_style=False, width=1 << 16).strip()
+
+
+def _profile(qos: Qos) -> dict[str, Any]:
+    return {
+        'history': qos.history.name.lower(),
+        'depth': qos.depth,
+        'reliability': qos.reliability.name.lower(),
+        'durability': qos.durability.name.lower(),
+        'deadline': _duration(qos.deadline),
+        'lifespan': _duration(qos.lifespan),
+        'liveliness': qos.liveliness.name.lower(),
+        'liveliness_lease_duration': _duration(qos.liveliness_lease_duration),
+        'avoid_ros_namespace_conventions': qos.avoid_ros_namespace_conventions,
+    }
+
+
+def _duration(time: QosTime) -> dict[str, int]:
+    return {'sec': time.sec, 'nsec': time.nsec}
+
+
+class _Dumper(yaml.SafeDumper):
+    def ignore_aliases(self, data: Any) -> bool:
+        return True

@@ -1,0 +1,42 @@
+"""What follows from the joined samples of a run: outputs and phase currents. No ROS here."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maglev_model.commutation import motor_phase_currents
+from maglev_model.platen import outputs_of_gaps
+from maglev_monitor.metrics.decoding import Records
+
+FloatArray = NDArray[np.float64]
+
+SOURCES = ('true', 'measured')
+"""Where positions come from, in the order of :func:`positions`."""
+
+_OUTPUT_STATES = [0, 2, 4, 6, 8]  # x1, x3, x5, x7, x9 of Table II
+
+
+def positions(rows: Records, radius: float) -> FloatArray:
+    """Outputs by source (true, measured) [m, rad], NaN where unknown, shape (n, 2, 5).
+
+    ``radius`` is r of (5) [m]. Gaps that no tilt can make give NaN tilts.
+    """
+    found = np.full((len(rows), 2, 5), np.nan)
+    plant = rows['has_plant']
+    found[plant, 0] = rows['state'][plant][:, _OUTPUT_STATES]
+    measured = rows['has_measurement']
+    some = rows[measured]
+    found[measured, 1] = outputs_of_gaps(some['gap'], some['x'], some['z'], radius)
+    return found
+
+
+def phase_currents(rows: Records, pole_pitch: float) -> FloatArray:
+    """Currents in the three phases of the four motors [A], shape (n, 4, 3).
+
+    :param rows: joined rows that have currents and measurement, shape (n,).
+    :param pole_pitch: tau [m].
+    """
+    return motor_phase_currents(
+        rows['direct_current'], rows['quadrature_current'], rows['x'], rows['z'], pole_pitch
+    )

@@ -1,0 +1,132 @@
+"""The parameters of a run: its machine, how it is measured and what it must keep. No ROS here."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from maglev_model.machine import MachineParameters
+from maglev_model.parameters import ParameterError, build, group, parameter, values
+
+RUN_KEY = 'run'
+"""Key of the value in the monitor's diagnostics that carries the parameters of the run."""
+
+FAULT_LEVEL = 2
+"""Diagnostic level from which on a node's message counts as a fault (REP-107: ERROR)."""
+
+_FORMER_NAMES = {
+    'metrics.radius': 'machine.radius',
+    'metrics.pole_pitch': 'machine.pole_pitch',
+}
+
+NOT_CHECKED = -1.0
+"""A limit below zero is not checked."""
+
+
+def _limit(description: str, unit: str = '') -> Any:
+    return parameter(
+        NOT_CHECKED, unit=unit, lower=-1.0, description=f'{description}; below 0: not checked'
+    )
+
+
+def _axis_limits(description: str) -> Any:
+    return parameter(
+        (NOT_CHECKED,) * 5,
+        unit='m, m, m, rad, rad',
+        lower=-1.0,
+        length=5,
+        description=f'{description}, for y, x, z, phi, theta; below 0: not checked',
+    )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class MetricsParameters:
+    """How the metrics are computed."""
+
+    sample_time: float = parameter(
+        1e-3, unit='s', lower=1e-5, upper=1.0, description='stage time from sample to sample'
+    )
+    peak_current: float = parameter(
+        7.0, unit='A', lower=0.0, upper=100.0, description="the amplifiers' peak, for the report"
+    )
+    continuous_current: float = parameter(
+        5.0, unit='A', lower=0.0, upper=100.0, description="the amplifiers' rating, for the report"
+    )
+    settling_bound: tuple[float, ...] = parameter(
+        (1e-4, 1e-4, 1e-4, 1e-4, 1e-4),
+        unit='m, m, m, rad, rad',
+        lower=1e-9,
+        upper=1.0,
+        length=5,
+        description='t_s counts until |e| stays within this, for y, x, z, phi, theta',
+    )
+    encoder_bound: tuple[float, ...] = parameter(
+        (1e-5, 1e-5, 1e-5, 2e-5, 2e-5),
+        unit='m, m, m, rad, rad',
+        lower=1e-9,
+        upper=1.0,
+        length=5,
+        description='t_enc counts until |e| stays within this, for y, x, z, phi, theta',
+    )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class RunLimits:
+    """What a run must keep to pass."""
+
+    max_mean_error: tuple[float, ...] = _axis_limits('mean |e| over the tracking window')
+    max_error: tuple[float, ...] = _axis_limits('largest |e| over the tracking window')
+    max_overshoot: float = _limit('overshoot of every step', '%')
+    max_settling_time: float = _limit('t_s of every step', 's')
+    max_encoder_time: float = _limit('t_enc of every step', 's')
+    max_phase_current: float = _limit('peak of any phase current', 'A')
+    min_real_time_factor: float = _limit('stage time over wall time')
+    max_missing_samples: int = parameter(
+        0, lower=-1, description='samples lost on any topic; below 0: not checked'
+    )
+    max_late_samples: int = parameter(
+        -1, lower=-1, description='samples with late currents; below 0: not checked'
+    )
+    min_samples: int = parameter(0, lower=0, description='samples that must have been measured')
+    min_steps: int = parameter(0, lower=0, description='steps that must have been measured')
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class RunParameters:
+    """What a run is called, its machine, how it is measured and what it must keep."""
+
+    scenario: str = parameter('', description='name of the scenario, for the metrics')
+    stage: str = parameter('', description='the stage that runs: plant or hw_bridge')
+    mode: str = parameter('', description='lockstep or realtime')
+    machine: MachineParameters = group(MachineParameters)
+    metrics: MetricsParameters = group(MetricsParameters)
+    limits: RunLimits = group(RunLimits)
+
+
+def run_to_json(run: RunParameters) -> str:
+    """The table as one line of JSON, as the monitor leaves it in its diagnostics for the bag."""
+    named: dict[str, object] = {}
+    for field in dataclasses.fields(RunParameters):
+        value = getattr(run, field.name)
+        if dataclasses.is_dataclass(value):
+            named.update({f'{field.name}.{key}': inner for key, inner in values(value).items()})
+        else:
+            named[field.name] = value
+    return json.dumps(named, separators=(',', ':'))
+
+
+def run_from_json(text: str) -> RunParameters:
+    """Invert :func:`run_to_json`, also for bags in which parameters had their former names.
+
+    Raises ParameterError for anything else.
+    """
+    try:
+        found: Any = json.loads(text)
+    except ValueError as error:
+        raise ParameterError(f'the parameters of the run are no JSON: {error}') from error
+    if not isinstance(found, Mapping):
+        raise ParameterError('the parameters of the run are no JSON object')
+    named = {str(_FORMER_NAMES.get(str(name), name)): value for name, value in found.items()}
+    return build(RunParameters, named)

@@ -1,0 +1,70 @@
+"""The figures of a run as a table for the terminal. No ROS here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from maglev_model.axes import AXES
+from maglev_monitor.metrics.readable import angle_or_length, micro, number, seconds
+
+
+def as_text(found: Mapping[str, Any]) -> str:
+    """The content of ``metrics.json`` as lines of text."""
+    lines = [_title(found), *_tracking_lines(found), *_step_lines(found), *_other_lines(found)]
+    lines.append(f'verdict: {found["verdict"]}')
+    lines += [f'  {reason}' for reason in found['reasons']]
+    return '\n'.join(lines)
+
+
+def _title(found: Mapping[str, Any]) -> str:
+    words = [found[key] for key in ('scenario', 'stage', 'mode') if found[key]]
+    name = ', '.join(words) or 'run'
+    return (
+        f'{name}: {found["duration"]:g} s measured, {found["samples"]} samples,'
+        f' {found["error_source"]} position'
+    )
+
+
+def _tracking_lines(found: Mapping[str, Any]) -> Iterator[str]:
+    axes = found['axes']
+    if axes['y']['mean_abs_error'] is None:
+        return
+    yield f'  {"tracking":<8}{"mean |e|":>16}{"rms e":>16}{"max |e|":>16}'
+    for axis in AXES:
+        row = axes[axis]
+        names = ('mean_abs_error', 'rms_error', 'max_abs_error')
+        yield f'  {axis:<8}' + ''.join(f'{micro(axis, row[name]):>16}' for name in names)
+
+
+def _step_lines(found: Mapping[str, Any]) -> Iterator[str]:
+    if not found['steps']:
+        return
+    yield f'  {"step":<8}{"from":>14}{"to":>14}{"overshoot":>12}{"t_s":>12}{"t_enc":>12}'
+    for step in found['steps']:
+        axis = step['axis']
+        yield (
+            f'  {axis:<8}{angle_or_length(axis, step["from"]):>14}'
+            f'{angle_or_length(axis, step["to"]):>14}{step["overshoot_percent"]:>10.1f} %'
+            f'{seconds(step["settling_time"]):>12}{seconds(step["encoder_time"]):>12}'
+        )
+
+
+def _other_lines(found: Mapping[str, Any]) -> Iterator[str]:
+    currents, timing = found['currents'], found['timing']
+    rms = ' '.join(f'{value:.2f}' for value in currents['rms'])
+    yield (
+        f'  currents: peak phase {currents["peak_phase"]:.2f} A, rms {rms} A,'
+        f' {currents["saturated_samples"]} samples saturated'
+    )
+    if timing['tick_p50'] is not None:
+        factor = timing['real_time_factor']
+        yield (
+            f'  timing: {number(factor) if factor else "–"} x real time, tick'
+            f' {timing["tick_p50"] * 1e6:.0f} µs median, {timing["tick_p99"] * 1e6:.0f} µs p99,'
+            f' {timing["late_samples"]} samples late'
+        )
+    missing = ', '.join(
+        f'{count} {key}' for key, count in found['missing_by_topic'].items() if count
+    )
+    yield f'  missing samples: {found["missing_samples"]}' + (f' ({missing})' if missing else '')

@@ -1,0 +1,73 @@
+"""One node of a kind on the graph: others are looked for, and the later one leaves."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from maglev_node.node import MaglevNode, NodeError
+
+DISCOVERY_TIME = 1.0
+"""How long a node looks for others of its kind before it takes its place on the graph [s]."""
+
+_PROBATION = 5.0
+"""How long it goes on looking afterwards, and is the one to leave [s]."""
+
+_LOOK_PERIOD = 0.25  # [s]
+
+
+class GraphGuard:
+    """Keeps a node the only publisher of the topic it claims.
+
+    On a busy machine discovery can take longer than :data:`DISCOVERY_TIME`, so the node goes on
+    looking for its first seconds, and leaves when it finds another then.
+    """
+
+    def __init__(self, node: MaglevNode[Any]) -> None:
+        self._node = node
+        self._topic = self._kind = ''
+
+    def claim(self, topic: str, kind: str) -> None:
+        """Be the only publisher of a topic: raise NodeError when another node publishes it.
+
+        Called before the publisher is made; waits until discovery has had :data:`DISCOVERY_TIME`
+        since the node came up. ``kind`` names the node in messages.
+        """
+        while self._age < DISCOVERY_TIME:
+            time.sleep(0.02)
+        publishers = self._node.get_publishers_info_by_topic(topic)
+        if publishers:
+            raise NodeError(self._taken(topic, kind, publishers[0].node_name))
+        first_claim = not self._topic
+        self._topic, self._kind = topic, kind
+        if first_claim:
+            self._timer = self._node.create_timer(
+                _LOOK_PERIOD, self._look_again, clock=self._node.steady_clock
+            )
+
+    def alone(self) -> bool:
+        """Whether what was claimed still has one publisher; otherwise the node ends."""
+        found = self._node.get_publishers_info_by_topic(self._topic)
+        if len(found) > 1:
+            self._node.fail(self._taken(self._topic, self._kind, found[0].node_name))
+        return len(found) <= 1
+
+    def on_probation(self) -> bool:
+        """Whether the node is so young that another of its kind may yet be discovered."""
+        return self._age < _PROBATION
+
+    @property
+    def _age(self) -> float:
+        return time.monotonic() - self._node.came_up
+
+    def _look_again(self) -> None:
+        self.alone()
+        if not self.on_probation():
+            self._timer.cancel()
+
+    @staticmethod
+    def _taken(topic: str, kind: str, who: str) -> str:
+        return (
+            f"{topic} is already published by '{who}': there is another {kind} on this graph;"
+            ' stop it, or use another ROS_DOMAIN_ID'
+        )

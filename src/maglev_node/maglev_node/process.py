@@ -1,0 +1,98 @@
+"""A process that runs one node: from its signals to its exit code."""
+
+from __future__ import annotations
+
+import gc
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+
+import rclpy
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+from maglev_model.parameters import ParameterError
+from maglev_node.dds import prepare_middleware
+from maglev_node.node import MaglevNode, NodeError
+
+_DELIVERY_TIME = 0.5
+"""Longest wait at the end for readers to have what was published [s]."""
+
+_BACKGROUND_NICENESS = 5
+
+
+def run(make_node: Callable[[], MaglevNode[Any]], name: str) -> int:
+    """Run one node to its end and return the exit code of the process.
+
+    SIGINT and SIGTERM end it in order: :meth:`MaglevNode.close` runs and can still publish.
+    What the user did wrong is one line on stderr; a defect shows its traceback.
+    """
+    caught: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda signum, _frame: caught.append(signum))
+    node: MaglevNode[Any] | None = None
+    prepare_middleware()
+    try:
+        rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
+        node = make_node()
+        gc.collect()
+        gc.freeze()
+        running = node
+        node.spin(lambda: len(caught) > 1 or bool(caught and running.may_stop()))
+    except (NodeError, ParameterError) as error:
+        print(f'{name}: error: {error}', file=sys.stderr, flush=True)
+        return 1
+    except Exception as error:
+        if not _is_user_error(error):
+            raise
+        text = str(error).split(', at /')[0].splitlines()[0]
+        print(f'{name}: error: {text}', file=sys.stderr, flush=True)
+        return 1
+    finally:
+        _close(node)
+    if node.exit_code is not None:
+        return node.exit_code
+    return 128 + caught[0] if caught else 0
+
+
+def main(make_node: Callable[[], MaglevNode[Any]], name: str, *, background: bool = False) -> None:
+    """Entry point of an executable: run one node and leave with its exit code.
+
+    A node in the background yields to those of the loop when they want the same core.
+    Leaves without the interpreter's own teardown, which may block in the middleware.
+    """
+    if background:
+        os.nice(_BACKGROUND_NICENESS)
+    try:
+        code = run(make_node, name)
+    except Exception:
+        sys.excepthook(*sys.exc_info())
+        code = 70
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
+
+
+def _is_user_error(error: Exception) -> bool:
+    """Errors ROS raises for what was typed: unknown arguments, unreadable parameter files."""
+    return type(error).__module__.startswith(('rclpy', '_rclpy'))
+
+
+def _close(node: MaglevNode[Any] | None) -> None:
+    if node is not None:
+        node.close()
+        _deliver(node)
+        node.destroy_node()
+    rclpy.try_shutdown()
+
+
+def _deliver(node: Node) -> None:
+    """Give what was published last, such as currents of zero, the time to arrive."""
+    deadline = time.monotonic() + _DELIVERY_TIME
+    for publisher in node.publishers:
+        left = max(deadline - time.monotonic(), 0.0)
+        publisher.wait_for_all_acked(Duration(seconds=left))

@@ -1,0 +1,279 @@
+"""One stage on the graph: its samples go out, the currents that answer them come in."""
+
+from __future__ import annotations
+
+import time
+from itertools import count
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+
+from maglev_model.stage import EncoderSample, Fault, Stage, StageError
+from maglev_msgs.msg import Currents
+from maglev_node.managed_node import ManagedNode
+from maglev_node.pacing import Deadlines, Pace, StageClock
+from maglev_node.polling import PolledSubscription, Queues
+from maglev_node.sample_publisher import SamplePublisher
+from maglev_node.stage_parameters import ClockedStageParameters, StageNodeParameters
+from maglev_node.topics import CURRENTS, sample_qos
+
+_REPEAT_PERIOD = 0.02
+"""How often lockstep looks whether an answer is overdue, and repeats the first sample [s]."""
+
+P = TypeVar('P', bound=StageNodeParameters)
+S = TypeVar('S', bound=Stage)
+
+
+class Sampling(Generic[P, S]):
+    """Takes a stage's samples from :meth:`start` to :meth:`stop`; again after another start.
+
+    Lockstep: the first sample is repeated until a controller answers it; from then on each sample
+    waits for the currents with its sequence number. Real time: a sample every sample time, with the
+    newest currents, hence one sample of delay. Currents are followed only once they have been zero
+    since the start, or since a fault was reset: a controller that went on flying meanwhile would
+    throw the platen off its stop.
+    """
+
+    def __init__(self, node: ManagedNode[P], stage: S) -> None:
+        self.stage = stage
+        self.sequence = node.parameters.first_sequence - 1
+        self.late_samples = 0
+        self.answered = False  # by a controller, since the start
+        self.armed = False  # currents are followed
+        self._node = node
+        self._lost = False  # the stage cannot go on
+        self._reported: Fault | None = None
+        self._sample: EncoderSample | None = None
+        self._sample_time = 0.0  # when it was taken
+        self._timer: Any = None
+        self._direct = self._quadrature = np.zeros(4)
+        self._newest = self._applied = -1  # sequence of the currents that came, were followed last
+        self._publisher = SamplePublisher(node, truth=stage.truth() is not None)
+        self._answers: Any = None
+        self._queues: Queues | None = None
+        self._pace: Pace = StageClock(stage.sample_time)
+        if not stage.paced:
+            self._pace = Deadlines(stage.sample_time)
+        if node.parameters.mode == 'lockstep':
+            self._answers = node.create_subscription(
+                Currents, CURRENTS, self._on_answer, sample_qos()
+            )
+        else:
+            self._queues = Queues(node)
+            self._currents: PolledSubscription = self._queues.subscribe(CURRENTS, Currents)
+
+    def start(self) -> None:
+        """Activate the stage and take the first sample. Raises StageError."""
+        self.stage.activate()
+        self.answered = self.armed = self._lost = False
+        self._newest = self._applied = -1
+        self._sample = self.stage.read()
+        self.sequence += 1
+        self._sample_time = time.monotonic()
+        self._pace.start(self.sequence)
+        period, action = self._pace.period, self._on_tick
+        if self._answers is not None:
+            period, action = _REPEAT_PERIOD, self._watch_answers
+        self._timer = self._node.create_timer(period, action, clock=self._node.steady_clock)
+
+    def stop(self) -> None:
+        """Land, then take no more samples. Raises StageError."""
+        self._stop_timer()
+        self.land('deactivated')
+        self.stage.deactivate()
+
+    def release(self) -> None:
+        """Give up the stage, with no current flowing, and what the node itself does not."""
+        self._stop_timer()
+        self.stage.close()
+        if self._queues is not None:
+            self._queues.destroy()
+            self._queues = None
+
+    def close(self) -> None:
+        """Release the stage and leave the graph."""
+        self.release()
+        self._publisher.destroy()
+        if self._answers is not None:
+            self._node.destroy_subscription(self._answers)
+
+    def land(self, why: str) -> None:
+        """Land, publishing every sample, and be done with it."""
+        self.stage.land(why)
+        self._go_on_alone()
+
+    def emergency_stop(self) -> str:
+        """Latch a fault; returns what comes of it."""
+        self.stage.stop()
+        self._report()
+        return str(self.stage.fault)
+
+    def reset(self) -> tuple[bool, str]:
+        """Clear the stage's fault; a stage that was lost samples again."""
+        success, message = self.stage.reset()
+        self._report()
+        if success:
+            self.armed = False
+            lost, self._lost = self._lost, False
+            if lost and self._timer is not None:
+                self.answered = False
+                self._advance()
+        return success, message
+
+    def _stop_timer(self) -> None:
+        if self._timer is not None:
+            self._node.destroy_timer(self._timer)
+            self._timer = None
+
+    # -- lockstep ----------------------------------------------------------------------------------
+
+    def _on_answer(self, message: Currents) -> None:
+        if message.sequence != self.sequence or self._timer is None:
+            return
+        if not (self.answered or self._publisher.watched(self._node.parameters.watchers)):
+            return
+        self.answered = True
+        self._apply(message.direct_current, message.quadrature_current)
+        self._advance()
+
+    def _watch_answers(self) -> None:
+        if self._lost:
+            return
+        waited = time.monotonic() - self._sample_time
+        if not self.answered:
+            self._publish()
+        elif waited > self._node.parameters.answer_timeout:
+            who = (
+                'the controller, or the reference it waits for, has stopped'
+                if self._answers.get_publisher_count()
+                else f'no controller publishes {CURRENTS} any more'
+            )
+            self._unanswered(f'no currents for sample {self.sequence} within {waited:.1f} s: {who}')
+
+    def _unanswered(self, message: str) -> None:
+        """Land without the controller; wait for one again, or end the node."""
+        if self.stage.restartable:
+            self._node.get_logger().error(message)
+            self._go_on_alone()
+            self.answered = False
+        else:
+            self._go_on_alone()
+            self._node.fail(message)
+
+    # -- real time ---------------------------------------------------------------------------------
+
+    def _on_tick(self) -> None:
+        if self._lost or self._overrun():
+            return
+        pace, stage = self._pace, self.stage
+        for taken in count(1):
+            self._take_sample()
+            if self._lost or not pace.again(self.sequence, taken, stage.late):
+                break
+        wait = pace.wait(stage.late + time.monotonic() - self._sample_time)
+        if wait is not None and self._timer is not None:
+            self._timer.timer_period_ns = int(1e9 * wait)
+            self._timer.reset()
+
+    def _overrun(self) -> bool:
+        behind, parameters = self._pace.behind(self.sequence), self._node.parameters
+        if not isinstance(parameters, ClockedStageParameters) or behind <= parameters.overrun_limit:
+            return False
+        self._node.fail(
+            f'{behind:.2f} s behind the clock at sample {self.sequence}: this machine is too'
+            ' slow or too busy for real time; free a core, or use mode lockstep'
+        )
+        return True
+
+    def _take_sample(self) -> None:
+        """One sample, and the newest currents that have arrived by then."""
+        self._advance()
+        self._take_currents()
+        if self.answered and self._newest < self.sequence - 1:
+            self.late_samples += 1
+        if self._newest != self._applied:
+            self._applied = self._newest
+            self._apply(self._direct, self._quadrature)
+        else:
+            self._hold()
+
+    def _take_currents(self) -> None:
+        """Called at the tick, so that none come too late."""
+        for message, _ in self._currents.take():
+            self._newest = message.sequence
+            self._direct = message.direct_current
+            self._quadrature = message.quadrature_current
+            # A controller that catches up with what it missed at its start is not late.
+            self.answered |= message.sequence >= self.sequence - 2
+
+    # -- both --------------------------------------------------------------------------------------
+
+    def _advance(self) -> None:
+        """Take the next sample and publish it."""
+        if self._lost:
+            return
+        try:
+            self._sample = self.stage.read()
+        except StageError as error:
+            self._lose(error)
+        else:
+            self.sequence += 1
+            self._sample_time = time.monotonic()
+            self._publish()
+        self._report()
+
+    def _publish(self) -> None:
+        if self._sample is not None:
+            truth = self.stage.truth()
+            self._publisher.publish(self.sequence, self._sample, self.late_samples, truth)
+
+    def _apply(self, direct_current: Any, quadrature_current: Any) -> None:
+        """Let the stage follow fresh currents, if they are followed yet."""
+        if not self._heeds(direct_current, quadrature_current):
+            self._hold()
+        elif not self._lost:
+            try:
+                self.stage.write(direct_current, quadrature_current)
+            except StageError as error:
+                self._lose(error)
+            except ValueError as error:
+                if self.stage.fault is None:
+                    self.stage.stop(str(error))
+            self._report()
+
+    def _heeds(self, direct_current: Any, quadrature_current: Any) -> bool:
+        """Whether currents are followed: from when they have been zero, see the class."""
+        if not self.armed:
+            flowing = np.any(direct_current) or np.any(quadrature_current)
+            self.armed = self.answered and not flowing
+        return self.armed
+
+    def _hold(self) -> None:
+        """No currents to follow for this sample."""
+        if not self._lost:
+            try:
+                self.stage.hold()
+            except StageError as error:
+                self._lose(error)
+            self._report()
+
+    def _go_on_alone(self) -> None:
+        """Sample without a controller until the stage has landed, if it flies."""
+        while self.stage.flying and not self._lost:
+            self._hold()
+            self._advance()
+        self._hold()
+
+    def _lose(self, error: StageError) -> None:
+        """The stage cannot go on: that ends the node, unless a reset can bring it back."""
+        self._lost = True
+        if not self.stage.restartable:
+            self._node.fail(str(error))
+
+    def _report(self) -> None:
+        """Say a new fault, once."""
+        fault = self.stage.fault
+        if fault is not self._reported:
+            self._reported = fault
+            if fault is not None:
+                self._node.get_logger().error(f'fault at sample {self.sequence}: {fault}')

@@ -1,0 +1,128 @@
+"""A whole flight in one call, from the lower stop and back to it, without ROS.
+
+from maglev_study.flight import fly
+print(fly('ellipse', duration=20.0).mean_error)
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maglev_controller.parameters import ControllerParameters
+from maglev_controller.regulator import Regulator
+from maglev_model.axes import AXES, FloatArray
+from maglev_model.parameters import ParameterError, from_yaml, replace
+from maglev_model.phases import Phase
+from maglev_plant.parameters import PlantParameters
+from maglev_plant.simulation import SimulatedStage
+from maglev_reference.parameters import ReferenceParameters
+from maglev_reference.timeline import Timeline
+from maglev_study.closed_loop import Run, run
+from maglev_study.references import References
+
+T = TypeVar('T')
+
+ELLIPSE: Mapping[str, object] = {
+    'trajectory': 'sinusoids',
+    'sinusoids.y.amplitude': (0.005,),
+    'sinusoids.y.phase': (-math.pi / 2,),
+    'sinusoids.x.amplitude': (0.03,),
+    'sinusoids.x.phase': (-math.pi / 2,),
+    'sinusoids.z.amplitude': (0.03,),
+}
+"""The paper's ellipse (section IV-B), as parameters of the reference."""
+
+ELLIPSE_4DOF: Mapping[str, object] = {**ELLIPSE, 'sinusoids.theta.amplitude': (0.01,)}
+"""The paper's ellipse with a rotation about the Z axis."""
+
+_NAMED = {'ellipse': ELLIPSE, 'ellipse_4dof': ELLIPSE_4DOF}
+
+
+@dataclasses.dataclass(frozen=True)
+class FlightRecord:
+    """What happened in the n samples of a flight; row k is sample k.
+
+    ``time`` (n,) [s]; ``phase`` (n,) of :class:`maglev_model.phases.Phase`; ``reference`` what was
+    to be followed, (n, 5) each; ``run`` the true states and the currents.
+    """
+
+    time: FloatArray
+    phase: NDArray[np.uint8]
+    reference: References
+    run: Run
+
+    @property
+    def output(self) -> FloatArray:
+        """The true outputs y, x, z, phi, theta (n, 5) [m, rad]."""
+        return self.run.output
+
+    @property
+    def error(self) -> FloatArray:
+        """True outputs less reference (n, 5) [m, rad]."""
+        return self.output - self.reference.position
+
+    @property
+    def measured(self) -> NDArray[np.bool_]:
+        """The samples (n,) in which errors count: on the trajectory after its run-in, or steps."""
+        return np.isin(self.phase, (Phase.TRACK, Phase.STEP))
+
+    @property
+    def mean_error(self) -> dict[str, float]:
+        """Mean |e| by axis over the measured samples [m, rad]."""
+        mean = np.abs(self.error[self.measured]).mean(axis=0)
+        return {axis: float(value) for axis, value in zip(AXES, mean, strict=True)}
+
+
+def fly(
+    trajectory: str | None = None,
+    *,
+    duration: float | None = None,
+    files: Sequence[str | Path] = (),
+    plant: Mapping[str, object] | None = None,
+    controller: Mapping[str, object] | None = None,
+    reference: Mapping[str, object] | None = None,
+) -> FlightRecord:
+    """Lift off, follow a trajectory, land: simulated stage, regulator and reference in lockstep.
+
+    ``trajectory`` is ``ellipse``, ``ellipse_4dof`` or one of the reference's own; ``duration`` [s]
+    the time that is measured. All parameters have the nodes' defaults, the benchmark plant among
+    them. ``files`` are parameter files as the nodes take them, the later winning; what is given
+    here by name wins over them, ``plant={'encoder.gap_noise': 1e-6}``.
+
+    Raises ParameterError naming what is wrong with a parameter or out of the reference's reach, and
+    MeasurementFault when the regulator gives the platen up.
+    """
+    followed: dict[str, object] = {}
+    if trajectory is not None:
+        followed.update(_NAMED.get(trajectory, {'trajectory': trajectory}))
+    if duration is not None:
+        followed['duration'] = duration
+    stage_table = _table(PlantParameters, 'plant', files, plant)
+    control_table = _table(ControllerParameters, 'controller', files, controller)
+    course = _table(ReferenceParameters, 'reference', files, {**followed, **(reference or {})})
+    for name, table in (('plant', stage_table), ('controller', control_table)):
+        if table.sample_time != course.sample_time:
+            raise ParameterError(
+                f"parameter 'sample_time' of the {name} is {table.sample_time:g} s,"
+                f" the reference's is {course.sample_time:g} s: they must be the same"
+            )
+    timeline = Timeline(course)
+    assert timeline.end is not None
+    block = timeline.block(0, timeline.end + 1)
+    references = References(block.position, block.velocity, block.acceleration)
+    outcome = run(Regulator(control_table), SimulatedStage(stage_table), references)
+    time = course.sample_time * np.arange(block.phase.size, dtype=np.float64)
+    return FlightRecord(time, block.phase, references, outcome)
+
+
+def _table(
+    cls: type[T], node: str, files: Sequence[str | Path], given: Mapping[str, object] | None
+) -> T:
+    return replace(from_yaml(cls, node, *files), given or {})

@@ -1,0 +1,329 @@
+"""The figures of a run: against plain NumPy over the whole run, and against python-control."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import control
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from maglev_model.axes import AXES
+from maglev_model.parameters import build
+from maglev_model.phases import Phase
+from maglev_monitor.metrics.decoding import Records, decode
+from maglev_monitor.metrics.derived import phase_currents
+from maglev_monitor.metrics.joiner import ROW, Joiner
+from maglev_monitor.metrics.run_metrics import RunMetrics
+from maglev_monitor.metrics.run_parameters import MetricsParameters, RunParameters
+from maglev_monitor.metrics.step_response import StepTracker
+
+RUN = RunParameters()
+
+
+def figures(records: dict[str, Records], run: RunParameters = RUN, burst: int = 10_000) -> Any:
+    """The figures of decoded records, fed in bursts."""
+    metrics, joiner = RunMetrics(run), Joiner()
+    longest = max(len(part) for part in records.values())
+    for first in range(0, longest, burst):
+        for key, part in records.items():
+            joiner.add(key, part[first : first + burst])
+        for block in joiner.take():
+            metrics.add(block)
+    for block in joiner.finish():
+        metrics.add(block)
+    return metrics.result()
+
+
+@pytest.fixture(scope='module')
+def decoded(messages: dict[str, list[bytes]]) -> dict[str, Records]:
+    return {key: decode(key, part) for key, part in messages.items()}
+
+
+@pytest.fixture
+def records(decoded: dict[str, Records]) -> dict[str, Records]:
+    return dict(decoded)
+
+
+def test_tracking_errors(run: Any, records: dict[str, Records]) -> None:
+    found = figures(records)
+    error = (run.position - run.reference)[run.phase == Phase.TRACK]
+    for index, axis in enumerate(AXES):
+        row = found['axes'][axis]
+        assert row['mean_abs_error'] == pytest.approx(np.abs(error[:, index]).mean(), rel=1e-12)
+        assert row['rms_error'] == pytest.approx(np.sqrt((error[:, index] ** 2).mean()), rel=1e-12)
+        assert row['max_abs_error'] == np.abs(error[:, index]).max()
+    assert found['error_source'] == 'true'
+    assert found['verdict'] == 'pass'
+    assert found['samples'] == np.count_nonzero(np.isin(run.phase, (Phase.TRACK, Phase.STEP)))
+    assert found['duration'] == pytest.approx(found['samples'] * 1e-3)
+
+
+def test_without_the_true_state_errors_are_of_the_measured_position(
+    run: Any, records: dict[str, Records]
+) -> None:
+    true = figures(records)
+    records['measurement'] = records['measurement'].copy()
+    records['measurement']['gap'] += 1e-3
+    del records['plant']
+    found = figures(records)
+    error = (run.position[:, 0] + 1e-3 - run.reference[:, 0])[run.phase == Phase.TRACK]
+    assert found['error_source'] == 'measured'
+    assert found['axes']['y']['mean_abs_error'] == pytest.approx(np.abs(error).mean(), rel=1e-9)
+    for axis in ('x', 'theta'):
+        wanted = pytest.approx(true['axes'][axis]['rms_error'], rel=1e-9)
+        assert found['axes'][axis]['rms_error'] == wanted
+    assert found['missing_samples'] == 0
+
+
+def test_currents_and_timing(run: Any, records: dict[str, Records]) -> None:
+    found = figures(records)
+    moving = (run.phase != Phase.REST) & (run.phase != Phase.END)
+    stamp, late = run.stamp[moving], run.late[moving]
+    rms = np.sqrt((run.direct**2 + run.quadrature**2)[moving].mean(axis=0))
+    np.testing.assert_allclose(found['currents']['rms'], rms, rtol=1e-12)
+    assert found['currents']['saturated_samples'] == np.count_nonzero(run.saturated & moving)
+    assert found['currents']['peak_thermal_load'] == 0.25
+    timing = found['timing']
+    ticks = np.diff(stamp) * 1e-9
+    assert timing['tick_p50'] == pytest.approx(np.quantile(ticks, 0.5), abs=1.5e-6)
+    assert timing['tick_p99'] == pytest.approx(np.quantile(ticks, 0.99), abs=1.5e-5)
+    assert timing['tick_max'] == pytest.approx(ticks.max(), abs=1e-9)
+    assert timing['late_samples'] == late[-1] - late[0]
+    factor = (len(stamp) - 1) * 1e-3 / ((stamp[-1] - stamp[0]) * 1e-9)
+    assert timing['real_time_factor'] == pytest.approx(factor, rel=1e-9)
+
+
+def test_phase_currents_of_a_turning_vector() -> None:
+    rows = np.zeros(200, ROW)
+    rows['x'] = np.linspace(-0.05, 0.05, 200)
+    rows['z'] = 0.01
+    rows['direct_current'] = 3.0
+    rows['quadrature_current'] = 4.0
+    currents = phase_currents(rows, 0.05715)
+    np.testing.assert_allclose(currents.sum(axis=2), 0.0, atol=1e-12)
+    np.testing.assert_allclose((currents**2).sum(axis=2), 1.5 * 25.0, rtol=1e-12)
+    assert np.ptp(currents[:, 0], axis=0) == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
+    period = 2.0 * 0.05715
+    shifted = rows.copy()
+    shifted['x'] += period
+    np.testing.assert_allclose(phase_currents(shifted, 0.05715), currents, atol=1e-9)
+    np.testing.assert_allclose(currents[:, 1].max(), 5.0, rtol=1e-3)
+
+
+def test_bursts_and_block_edges_change_no_bit(records: dict[str, Records]) -> None:
+    once = figures(records)
+    for burst in (7, 50, 333, 500):
+        assert figures(records, burst=burst) == once
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    lost=st.dictionaries(
+        st.sampled_from(['reference', 'measurement', 'currents', 'controller', 'plant']),
+        st.sets(st.integers(70, 1120), min_size=1, max_size=30),
+    )
+)
+def test_lost_samples_are_counted_by_topic(lost: dict[str, set[int]], decoded: Any) -> None:
+    kept = {
+        key: part[~np.isin(part['sequence'], list(lost.get(key, set())))]
+        for key, part in decoded.items()
+    }
+    found = figures(kept)
+    expected = {key: len(lost.get(key, set())) for key in kept}
+    assert found['missing_by_topic'] == expected
+    assert found['missing_samples'] == sum(expected.values())
+    assert (found['verdict'] == 'pass') == (not any(expected.values()))
+
+
+def test_a_loss_of_whole_blocks_is_counted(records: dict[str, Records]) -> None:
+    kept = {
+        key: part[(part['sequence'] < 100) | (part['sequence'] >= 1050)]
+        for key, part in records.items()
+    }
+    metrics, joiner = RunMetrics(RUN), Joiner(block=50)
+    for key, part in kept.items():
+        joiner.add(key, part)
+    for block in joiner.finish():
+        metrics.add(block)
+    found = metrics.result()
+    assert found['missing_by_topic'] == dict.fromkeys(kept, 950)
+    assert found['run_samples'] == 1200 - 60 - 60
+
+
+def test_a_run_without_end_is_incomplete(run: Any, records: dict[str, Records]) -> None:
+    found = figures({key: part[:1000] for key, part in records.items()})
+    assert found['verdict'] == 'incomplete'
+    assert 'the run did not reach its end' in found['reasons']
+
+
+@pytest.mark.parametrize('lost', [(), (600,), (600, 799)])
+def test_a_landing_after_the_reference_was_ended_is_no_loss(
+    lost: tuple[int, ...], records: dict[str, Records]
+) -> None:
+    kept = {key: part[:1000] for key, part in records.items()}
+    reference = kept['reference'][:801]
+    kept['reference'] = reference[~np.isin(reference['sequence'], lost)]
+    found = figures(kept, burst=50)
+    assert found['missing_by_topic'] == dict.fromkeys(kept, 0) | {'reference': len(lost)}
+    assert found['reasons'][-1] == 'the run did not reach its end'
+
+
+def test_what_comes_after_the_end_changes_nothing(records: dict[str, Records]) -> None:
+    end = int(np.flatnonzero(records['reference']['phase'] == Phase.END)[0])
+    shorter = {key: part[: end + 1] for key, part in records.items()}
+    assert figures(shorter) == figures(records)
+
+
+def test_a_fault_fails_the_run_unless_it_comes_after_the_end(
+    run: Any, records: dict[str, Records]
+) -> None:
+    for sequence, verdict in ((500, 'fail'), (1199, 'pass')):
+        metrics, joiner = RunMetrics(RUN), Joiner()
+        metrics.add_fault(int(run.stamp[sequence]), 'plant', 'spent')
+        for key, part in records.items():
+            joiner.add(key, part)
+        for block in joiner.finish():
+            metrics.add(block)
+        found = metrics.result()
+        assert found['verdict'] == verdict
+        assert (found['reasons'] == ['fault in plant: spent']) == (verdict == 'fail')
+
+
+# -- steps -----------------------------------------------------------------------------------------
+
+
+def step_result(position: Any, start: float, target: float, sample_time: float = 1e-3) -> Any:
+    """The tracker's figures for a response of y, other axes at zero."""
+    parameters = build(MetricsParameters, {'sample_time': sample_time})
+    from_, to = np.zeros(5), np.zeros(5)
+    from_[0], to[0] = start, target
+    tracker = StepTracker(parameters, from_, to, 100)
+    values = np.zeros((len(position), 2, 5))
+    values[:, 0, 0] = position
+    values[:, 1, :] = np.nan
+    sequence = 100 + np.arange(len(position))
+    for part in np.array_split(np.arange(len(position)), 7):
+        tracker.add(sequence[part], values[part])
+    assert tracker.results(1)[0]['settling_time'] is None
+    return tracker.results(0)[0]
+
+
+@pytest.mark.parametrize(('start', 'target'), [(0.020, 0.027), (0.030, 0.025)])
+@pytest.mark.parametrize('damping', [0.2, 0.5, 0.9])
+def test_steps_agree_with_python_control(start: float, target: float, damping: float) -> None:
+    system = control.tf([36.0], [1.0, 12.0 * damping, 36.0])
+    time = np.arange(0.0, 8.0, 1e-3)
+    response = control.step_response(system, time).outputs
+    found = step_result(start + (target - start) * response, start, target)
+    share = 1e-4 / abs(target - start)
+    info = control.step_info(response, time, SettlingTimeThreshold=share, yfinal=1.0)
+    assert found['overshoot_percent'] == pytest.approx(info['Overshoot'], abs=1e-6)
+    assert found['settling_time'] == pytest.approx(info['SettlingTime'], abs=1.1e-3)
+    finer = control.step_info(response, time, SettlingTimeThreshold=share / 10.0, yfinal=1.0)
+    assert found['encoder_time'] == pytest.approx(finer['SettlingTime'], abs=1.1e-3)
+    assert (found['from'], found['to'], found['axis']) == (start, target, 'y')
+
+
+def test_a_step_that_stays_outside_never_settles() -> None:
+    found = step_result(np.full(500, 0.0268), 0.020, 0.027)
+    assert found['settling_time'] is None
+    assert found['encoder_time'] is None
+    assert found['overshoot_percent'] == 0.0
+    assert found['duration'] == 0.5
+
+
+def test_settled_means_to_stay() -> None:
+    position = np.full(500, 0.027)
+    position[[0, 250]] = 0.0272
+    found = step_result(position, 0.020, 0.027)
+    assert found['settling_time'] == pytest.approx(0.251)
+    assert found['overshoot_percent'] == pytest.approx(0.2 / 7.0 * 100.0)
+
+
+def test_one_count_of_error_is_within_the_encoder_bound() -> None:
+    found = step_result(np.full(300, 2701 * 1e-5), 0.020, 0.027)
+    assert found['encoder_time'] == 0.0
+
+
+def test_steps_of_a_run(run: Any, records: dict[str, Records]) -> None:
+    steps = figures(records)['steps']
+    assert [(step['axis'], step['from'], step['to']) for step in steps] == [
+        ('y', 0.020, 0.027),
+        ('theta', 0.0, 0.01),
+    ]
+    inside = run.segment == 3
+    overshoot = (run.position[inside, 0].max() - 0.027) / 0.007 * 100.0
+    assert steps[0]['overshoot_percent'] == pytest.approx(overshoot, rel=1e-9)
+    outside = np.abs(run.position[inside, 0] - 0.027) > 1e-4
+    assert steps[0]['settling_time'] == pytest.approx((np.flatnonzero(outside)[-1] + 1) * 1e-3)
+
+
+# -- limits ----------------------------------------------------------------------------------------
+
+
+def with_limits(**limits: Any) -> RunParameters:
+    return build(RunParameters, {f'limits.{name}': value for name, value in limits.items()})
+
+
+@pytest.mark.parametrize(
+    ('limits', 'reason'),
+    [
+        ({'max_mean_error': (1.0, 1.0, 1.0, 1.0, 1e-6)}, 'mean |e| of theta is'),
+        ({'max_error': (1.0, 1e-6, -1.0, -1.0, -1.0)}, 'largest |e| of x is'),
+        ({'max_overshoot': 10.0}, 'step of y from 20 mm to 27 mm: overshoot is'),
+        ({'max_settling_time': 0.01}, 't_s is 0.'),
+        ({'max_encoder_time': 100.0}, 't_enc is never reached'),
+        ({'max_phase_current': 1.0}, 'peak phase current is'),
+        ({'max_late_samples': 2}, 'number of late samples is'),
+        ({'min_real_time_factor': 3.0}, 'real-time factor is'),
+        ({'min_samples': 10_000}, 'number of measured samples is 780'),
+        ({'min_steps': 3}, 'number of measured steps is 2'),
+    ],
+)
+def test_a_broken_limit_fails_the_run(
+    limits: dict[str, Any], reason: str, records: dict[str, Records]
+) -> None:
+    found = figures(records, with_limits(**limits))
+    assert found['verdict'] == 'fail'
+    assert any(reason in line for line in found['reasons']), found['reasons']
+    assert set(limits) <= set(found['limits'])
+
+
+def test_kept_limits_pass_the_run(records: dict[str, Records]) -> None:
+    limits = with_limits(
+        max_mean_error=(1e-2,) * 5, max_overshoot=60.0, max_settling_time=1.0, min_samples=780
+    )
+    found = figures(records, limits)
+    assert found['verdict'] == 'pass'
+    assert found['reasons'] == []
+    assert found['limits']['max_mean_error'] == dict.fromkeys(AXES, 1e-2)
+
+
+def without(records: dict[str, Records], *phases: Phase) -> dict[str, Records]:
+    """The same run with some phases only held."""
+    changed = copy.deepcopy(records)
+    changed['reference'] = changed['reference'].copy()
+    changed['reference']['phase'][np.isin(changed['reference']['phase'], phases)] = Phase.HOLD
+    return changed
+
+
+def test_a_mean_error_limit_says_nothing_of_a_run_of_steps(records: dict[str, Records]) -> None:
+    steps = without(records, Phase.TRACK)
+    assert figures(steps, with_limits(max_mean_error=(1e-3,) * 5))['verdict'] == 'pass'
+
+
+def test_a_mean_error_that_was_not_measured_does_not_pass(records: dict[str, Records]) -> None:
+    changed = without(records, Phase.TRACK, Phase.STEP)
+    limits = with_limits(max_mean_error=(1e-3,) * 5)
+    found = figures(changed, limits)
+    assert any('not measured' in reason for reason in found['reasons'])
+    assert found['axes']['y'] == {
+        'mean_abs_error': None,
+        'rms_error': None,
+        'max_abs_error': None,
+    }
+    assert found['verdict'] == 'fail'

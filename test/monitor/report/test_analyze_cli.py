@@ -1,0 +1,169 @@
+"""``analyze BAG`` from a bag alone: same figures as live, the report, exit codes."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+from made_up_run import TOPICS, open_bag, write_samples
+from matplotlib.figure import Figure
+
+from maglev_model.parameters import ParameterError, build
+from maglev_monitor.bag.analysis import analyse
+from maglev_monitor.metrics.decoding import decode
+from maglev_monitor.metrics.joiner import Joiner
+from maglev_monitor.metrics.result_file import write_metrics
+from maglev_monitor.metrics.run_metrics import RunMetrics
+from maglev_monitor.metrics.run_parameters import RunParameters, run_from_json, run_to_json
+from maglev_monitor.report import run_report
+from maglev_monitor.report.analyze_cli import BAD_BAG, NOT_PASSED, PASS, analyze
+from maglev_monitor.report.terminal import as_text
+
+
+@pytest.fixture
+def no_plots(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures take seconds; one test draws them all."""
+    monkeypatch.setattr(run_report, 'plots', lambda _: [])
+
+
+def test_live_and_bag_agree_exactly(bag: Path, run: Any, messages: dict[str, list[bytes]]) -> None:
+    parameters = RunParameters(scenario='made_up', stage='plant', mode='lockstep')
+    metrics, joiner = RunMetrics(parameters), Joiner()
+    for first in range(0, len(run), 13):
+        for key, part in messages.items():
+            joiner.add(key, decode(key, part[first : first + 13]))
+        for block in joiner.take():
+            metrics.add(block)
+    for block in joiner.finish():
+        metrics.add(block)
+    assert json.dumps(metrics.result()) == json.dumps(analyse(bag).result)
+
+
+def test_report_is_self_contained(bag: Path, tmp_path: Path, capsys: Any) -> None:
+    assert analyze([str(bag), '--out', str(tmp_path)]) == PASS
+    page = (tmp_path / 'report.html').read_text(encoding='utf-8')
+    assert len(page) < 3_000_000
+    assert not re.findall(r'(?:src|href)="(?!data:)', page)
+    assert 'http' not in re.sub(r'base64,[^"]*', '', page)
+    titles = re.findall(r'<h2>([^<]*)</h2>', page)
+    for title in ('The whole run', 'Steps', 'Tracking in detail', 'The path', 'Currents', 'Timing'):
+        assert title in titles
+    assert page.count('data:image/png;base64,') == 6
+    assert 'made_up' in page
+    printed = capsys.readouterr().out
+    found = json.loads((tmp_path / 'metrics.json').read_text())
+    assert as_text(found) in printed
+    assert found['scenario'] == 'made_up'
+    assert not list(tmp_path.glob('*.tmp'))
+
+
+@pytest.mark.usefixtures('no_plots')
+def test_report_goes_beside_the_bag_and_keeps_the_live_metrics(bag: Path, tmp_path: Path) -> None:
+    folder = tmp_path / 'run'
+    shutil.copytree(bag, folder / 'bag')
+    (folder / 'metrics.json').write_text('live')
+    assert analyze([str(folder / 'bag')]) == PASS
+    assert (folder / 'report.html').is_file()
+    assert (folder / 'metrics.json').read_text() == 'live'
+
+
+@pytest.mark.parametrize('kept', [('measurement', 'currents'), ('measurement',)])
+def test_a_run_on_hardware_or_with_topics_lost_is_reported(
+    kept: tuple[str, ...],
+    tmp_path: Path,
+    run: Any,
+    messages: dict[str, list[bytes]],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    drawn: list[Figure] = []
+    monkeypatch.setattr(Figure, 'savefig', lambda figure, *_, **__: drawn.append(figure))
+    writer = open_bag(tmp_path / 'bag')
+    for key in ('reference', *kept):
+        stamps = run.stamp[:900].tolist()
+        writer.write(TOPICS[key][0], zip(messages[key], stamps, strict=False))
+    writer.close()
+    assert analyze([str(tmp_path / 'bag')]) == NOT_PASSED
+    found = json.loads((tmp_path / 'metrics.json').read_text())
+    assert found['error_source'] == 'measured'
+    assert found['verdict'] == 'incomplete'
+    assert ('currents' in kept) == (found['missing_by_topic']['currents'] == 0)
+    assert len(drawn) == {2: 6, 1: 5}[len(kept)]
+
+
+@pytest.mark.usefixtures('no_plots')
+def test_a_cut_off_bag_is_reported_and_says_so(bag: Path, tmp_path: Path, capsys: Any) -> None:
+    whole = (bag / 'bag_0.mcap').read_bytes()
+    cut = tmp_path / 'bag.mcap'
+    cut.write_bytes(whole[:-2000])
+    assert analyze([str(cut), '--out', str(tmp_path / 'out')]) == BAD_BAG
+    assert (tmp_path / 'out' / 'report.html').is_file()
+    captured = capsys.readouterr()
+    assert 'recovered' in captured.err
+    assert len(captured.err.splitlines()) == 1
+
+
+def test_no_bag_is_one_clear_line(tmp_path: Path, capsys: Any) -> None:
+    assert analyze([str(tmp_path / 'nothing')]) == BAD_BAG
+    captured = capsys.readouterr()
+    assert captured.out == ''
+    assert captured.err == f"analyze: error: there is no bag '{tmp_path / 'nothing'}'\n"
+
+
+def test_an_output_that_cannot_be_written_is_one_clear_line(
+    bag: Path, tmp_path: Path, capsys: Any
+) -> None:
+    (tmp_path / 'file').write_text('')
+    assert analyze([str(bag), '--out', str(tmp_path / 'file')]) == BAD_BAG
+    assert 'cannot write to' in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures('no_plots')
+def test_faults_and_limits_of_the_monitor_are_in_the_bag(
+    tmp_path: Path, run: Any, messages: dict[str, list[bytes]], encoder: Any
+) -> None:
+    limits = build(RunParameters, {'limits.max_overshoot': 5.0, 'scenario': 'limited'})
+    stamp = int(run.stamp[300])
+    writer = open_bag(tmp_path / 'bag')
+    write_samples(writer, run, messages)
+    for level, name, values in (
+        (0, 'monitor', {'run': run_to_json(limits)}),
+        (1, 'reference', {}),
+        (2, 'plant', {}),
+    ):
+        data = encoder.diagnostic(stamp, level, name, f'{name} says', values)
+        writer.write('/diagnostics', [(data, stamp)])
+    writer.close()
+    assert analyze([str(tmp_path / 'bag')]) == NOT_PASSED
+    found = json.loads((tmp_path / 'metrics.json').read_text())
+    assert found['scenario'] == 'limited'
+    assert found['faults'] == ['plant: plant says']
+    assert found['reasons'][0] == 'fault in plant: plant says'
+    assert any('overshoot' in reason for reason in found['reasons'])
+
+
+def test_parameters_survive_the_bag() -> None:
+    parameters = build(
+        RunParameters,
+        {'scenario': 'a', 'machine.radius': 0.4, 'limits.max_error': (1.0, 2.0, 3.0, 4.0, 5.0)},
+    )
+    assert run_from_json(run_to_json(parameters)) == parameters
+
+
+@pytest.mark.parametrize('text', ['', '[]', '{"nothing": 1}', '{"metrics.radius": -1.0}'])
+def test_damaged_parameters_are_refused(text: str) -> None:
+    with pytest.raises(ParameterError):
+        run_from_json(text)
+
+
+def test_metrics_are_written_whole_or_not_at_all(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / 'new' / 'metrics.json'
+    write_metrics(path, {'verdict': 'pass'})
+    with pytest.raises(TypeError):
+        write_metrics(path, {'verdict': object()})
+    assert json.loads(path.read_text()) == {'verdict': 'pass'}

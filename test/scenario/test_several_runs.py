@@ -1,0 +1,202 @@
+"""Scripts that make several runs, or none of the graph. Nodes and programs are stand-ins."""
+
+from __future__ import annotations
+
+import signal
+import time
+from pathlib import Path
+
+import pytest
+from stand_ins import Tree
+
+
+@pytest.fixture
+def papers(tree: Tree) -> Tree:
+    """A tree with all that the paper's tables ask for."""
+    for name in ('steps', 'ellipse_4dof'):
+        tree.parameters(f'params/scenario_{name}.yaml')
+    for name in ('benchmark', 'paper', 'paper_exact'):
+        tree.parameters(f'params/{name}.yaml')
+    return tree
+
+
+def tables(tree: Tree, *options: str) -> tuple[int, str]:
+    """Run the paper's tables into ``out``."""
+    return tree.finish('--out', str(tree.out), *options, script='paper_tables')
+
+
+def flown(tree: Tree) -> list[str]:
+    """The runs that began, by their folders within ``out``."""
+    return [
+        word.removeprefix(f'output:={tree.out}/').removesuffix('/bag')
+        for line in tree.history('recorder')
+        for word in line.split()
+        if word.startswith('output:=')
+    ]
+
+
+ALL_RUNS = [
+    f'{controller}/{scenario}'
+    for controller in ('paper', 'ours')
+    for scenario in ('steps', 'ellipse', 'ellipse_4dof')
+]
+
+
+def test_all_runs_then_the_page(papers: Tree) -> None:
+    code, output = tables(papers, '--mode=realtime')
+    assert (code, output.splitlines()[-1]) == (0, 'paper_tables: passed')
+    assert flown(papers) == ALL_RUNS
+    for run, line in zip(ALL_RUNS, papers.history('reference'), strict=True):
+        words = line.split()
+        assert 'mode:=realtime' in words
+        assert 'duration:=' not in line
+        files = [Path(word).name for word in words if word.endswith('.yaml') and ':=' not in word]
+        law = ['paper.yaml', 'paper_exact.yaml'] if run.startswith('paper/') else []
+        assert files == [f'scenario_{run.split("/")[1]}.yaml', 'benchmark.yaml', *law]
+    assert papers.history('paper_tables') == [str(papers.out)]
+    assert (papers.out / 'ours' / 'ellipse_4dof' / 'report.html').exists()
+
+
+def test_quick_runs_are_short(papers: Tree) -> None:
+    assert tables(papers, '--quick')[0] == 0
+    for run, line in zip(ALL_RUNS, papers.history('reference'), strict=True):
+        assert f'duration:={6.0 if run.endswith("steps") else 4.0}' in line.split()
+
+
+def test_a_run_that_fails_does_not_stop_the_others(papers: Tree) -> None:
+    papers.behave('monitor@ellipse', '1')
+    code, output = tables(papers)
+    assert code == 1
+    assert output.splitlines()[-1] == 'paper_tables: FAILED: paper/ellipse ours/ellipse'
+    assert flown(papers) == ALL_RUNS
+    assert len(papers.history('paper_tables')) == 1
+
+
+def test_a_page_that_fails_fails(papers: Tree) -> None:
+    papers.behave('paper_tables', '2')
+    code, output = tables(papers)
+    assert (code, output.splitlines()[-1]) == (1, 'paper_tables: FAILED')
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_run_in_progress_and_no_other_begins(
+    papers: Tree, number: signal.Signals
+) -> None:
+    papers.behave('monitor@ellipse', 'run')
+    process = papers.start('--out', str(papers.out), script='paper_tables')
+    while len(papers.history('reference')) < 2:
+        assert process.poll() is None
+        time.sleep(0.02)
+    process.send_signal(number)
+    output, _ = process.communicate(timeout=20)
+    assert process.returncode == 128 + number
+    assert papers.alive() == [], 'it did not wait for the clean-up'
+    assert flown(papers) == ALL_RUNS[:2]
+    assert 'interrupted' in output.splitlines()[-1]
+    assert not papers.history('paper_tables')
+
+
+@pytest.mark.parametrize(
+    ('options', 'words'),
+    [
+        (['--mode', 'fast'], "--mode is 'fast', it must be one of: lockstep realtime"),
+        (['--duration', '3'], "unknown option '--duration'"),
+        (['--out='], '--out needs a folder'),
+        (['--mode'], '--mode needs a value'),
+        (['--quick=no'], '--quick takes no value'),
+        (['--out', '/proc/nothing'], "cannot write to '/proc/nothing'"),
+    ],
+)
+def test_wrong_use_is_one_line(papers: Tree, options: list[str], words: str) -> None:
+    code, output = tables(papers, *options)
+    assert code == 2
+    assert output.startswith('paper_tables: error: ')
+    assert words in output
+    assert output.count('\n') == 1
+    assert not flown(papers)
+
+
+def test_a_folder_with_runs_is_refused(papers: Tree) -> None:
+    (papers.out / 'ours').mkdir(parents=True)
+    code, output = tables(papers)
+    assert code == 2
+    assert 'already holds runs' in output
+    assert not flown(papers)
+
+
+@pytest.mark.parametrize(
+    ('script', 'options'),
+    [
+        ('paper_tables', ('--mode', '--out', '--quick')),
+        ('compare', ('--out', '--quick', '--laws', '--bandwidth')),
+        ('commission', ('--params', '--current', '--yes')),
+        ('single_motor', ('--stage', '--mode', '--duration', '--params', '--out')),
+    ],
+)
+def test_help_names_every_option(tree: Tree, script: str, options: tuple[str, ...]) -> None:
+    code, output = tree.finish('--help', script=script)
+    assert code == 0
+    for option in (*options, '--help', f'usage: scenarios/{script}.sh'):
+        assert option in output
+    assert not tree.started()
+    assert not tree.history(script)
+
+
+@pytest.mark.parametrize(('verdict', 'parts'), [('0', ['steps', 'sinusoids']), ('1', ['steps'])])
+def test_the_single_motor_flies_its_second_part_when_the_first_passed(
+    tree: Tree, verdict: str, parts: list[str]
+) -> None:
+    for name in ('single_motor', 'scenario_single_motor_steps', 'scenario_single_motor_sinusoids'):
+        tree.parameters(f'params/{name}.yaml')
+    tree.behave('monitor@steps', verdict)
+    code, output = tree.finish('--duration=2', f'--out={tree.out}', script='single_motor')
+    assert (code, flown(tree)) == (int(verdict), parts), output
+    assert tree.files('controller') == [
+        'params/single_motor.yaml',
+        f'params/scenario_single_motor_{parts[-1]}.yaml',
+    ]
+    assert 'duration:=2.0' in tree.arguments('reference')
+
+
+def test_the_comparison_is_told_what_the_user_wants(tree: Tree) -> None:
+    options = ('--laws', 'paper', 'default', '--quick', '--bandwidth=300', '--out', 'here')
+    tree.behave('compare', '3')
+    assert tree.finish(*options, script='compare') == (3, '')
+    params = tree.path / 'params'
+    assert tree.history('compare') == [
+        f'--params {params} --out here --quick --laws paper default --bandwidth 300'
+    ]
+
+
+@pytest.mark.parametrize('option', ['--params', '--duration', '--law'])
+def test_the_comparison_refuses_what_it_would_not_heed(tree: Tree, option: str) -> None:
+    code, output = tree.finish(option, 'soft', script='compare')
+    assert (code, output) == (2, f"compare: error: unknown option '{option}'; see --help\n")
+    assert not tree.history('compare')
+
+
+def test_the_commissioning_gets_the_parameters_of_a_flight(tree: Tree) -> None:
+    for name in ('machine', 'hw_bridge'):
+        tree.parameters(f'params/{name}.yaml')
+    options = ('--params', 'soft', '--yes', '--current', '1.0')
+    assert tree.finish(*options, script='commission') == (0, '')
+    files = [
+        f'--params {tree.path}/params/{name}.yaml' for name in ('machine', 'hw_bridge', 'soft')
+    ]
+    assert tree.history('commission') == [f'{" ".join(files)} --current 1.0 --yes']
+
+
+@pytest.mark.parametrize(
+    ('options', 'words'),
+    [
+        (['--params', 'none'], "there is no file 'none'"),
+        (['--params', 'typo.yaml'], "parameters for 'bridge', which is no node"),
+        (['--stage', 'plant'], "unknown option '--stage'"),
+    ],
+)
+def test_the_commissioning_refuses(tree: Tree, options: list[str], words: str) -> None:
+    tree.parameters('typo.yaml', 'bridge')
+    code, output = tree.finish(*options, script='commission')
+    assert code == 2
+    assert words in output
+    assert not tree.history('commission')
