@@ -178,17 +178,10 @@ def test_a_held_frequency_leaves_nothing_and_a_constant_neither():
 def test_the_internal_model_is_the_controllers():
     reference, controller = ReferenceParameters(), ControllerParameters()
     assert reference.internal_model.fundamental == controller.internal_model.fundamental
-<<<<<<< HEAD
     for loop, axis in zip(reference.loops, controller.axes, strict=True):
         assert axis.design == 'bandwidth'
         for name in ('multiples', 'bandwidth', 'integration', 'learning'):
             assert getattr(axis, name) == getattr(loop, name)
-=======
-    for table, own in zip(reference.loops, controller.axes, strict=True):
-        assert own.design == 'bandwidth'
-        for field in dataclasses.fields(AxisLoopParameters):
-            assert getattr(own, field.name) == getattr(table, field.name)
->>>>>>> h-controller
 
 
 def test_the_ellipse_is_held():
