@@ -59,7 +59,7 @@ def compare(
     :raises BagError: when a bag cannot be read.
     """
     keys = [key for key in TOPIC_TYPES if key in topics]
-    found = {key: TopicComparison() for key in keys}
+    comparisons = {key: TopicComparison() for key in keys}
     ignored = () if wall_clock else WALL_CLOCK
     sides = (_Side(bags[0]), _Side(bags[1]))
     while not all(side.exhausted for side in sides):
@@ -70,8 +70,8 @@ def compare(
         for key in keys:
             upto = min(bound, *(side.newest(key) for side in sides))
             first, second = (_until(side.take(key, upto), end) for side in sides)
-            _compare(found[key], first, second, tolerance, ignored)
-    return {key: result for key, result in found.items() if result.both or any(result.only)}
+            _compare(comparisons[key], first, second, tolerance, ignored)
+    return {key: result for key, result in comparisons.items() if result.both or any(result.only)}
 
 
 class _Side:
@@ -122,28 +122,28 @@ def _until(records: Records | None, end: float) -> Records | None:
 
 
 def _compare(
-    found: TopicComparison,
+    comparison: TopicComparison,
     first: Records | None,
     second: Records | None,
     tolerance: float,
     ignored: Collection[str],
 ) -> None:
     if first is None or second is None:
-        for records, only in zip((first, second), found.only, strict=True):
+        for records, only in zip((first, second), comparison.only, strict=True):
             only.extend([] if records is None else records['sequence'].tolist())
         return
     numbers, left, right = np.intersect1d(
         first['sequence'], second['sequence'], assume_unique=True, return_indices=True
     )
-    found.both += len(numbers)
-    found.only[0].extend(np.delete(first['sequence'], left).tolist())
-    found.only[1].extend(np.delete(second['sequence'], right).tolist())
+    comparison.both += len(numbers)
+    comparison.only[0].extend(np.delete(first['sequence'], left).tolist())
+    comparison.only[1].extend(np.delete(second['sequence'], right).tolist())
     if not len(numbers):
         return
     for name in first.dtype.names or ():
         if name not in ignored:
             difference = _difference(first[name][left], second[name][right], tolerance)
-            _note(found, name, numbers, difference)
+            _note(comparison, name, numbers, difference)
 
 
 def _difference(first: NDArray[Any], second: NDArray[Any], tolerance: float) -> NDArray[Any]:
@@ -164,16 +164,16 @@ def _difference(first: NDArray[Any], second: NDArray[Any], tolerance: float) -> 
 
 
 def _note(
-    found: TopicComparison, name: str, numbers: NDArray[Any], difference: NDArray[Any]
+    comparison: TopicComparison, name: str, numbers: NDArray[Any], difference: NDArray[Any]
 ) -> None:
     differing = np.flatnonzero(~np.isnan(difference))
     if not len(differing):
         return
     largest = float(difference[differing].max())
-    known = found.differences.get(name)
+    known = comparison.differences.get(name)
     if known is None:
         first = int(numbers[differing[0]])
-        found.differences[name] = FieldDifference(largest, first, len(differing))
+        comparison.differences[name] = FieldDifference(largest, first, len(differing))
     else:
         known.largest = max(known.largest, largest)
         known.samples += len(differing)

@@ -25,11 +25,11 @@ def compare_bags(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         bags = (Bag(options.first), Bag(options.second))
-        found = compare(
+        comparisons = compare(
             bags, options.topics, tolerance=options.tolerance, wall_clock=options.wall_clock
         )
-        lost = [key for key in options.topics if key not in found]
-        if not found or (lost and options.topics is not _ALL):
+        lost = [key for key in options.topics if key not in comparisons]
+        if not comparisons or (lost and options.topics is not _ALL):
             raise BagError(f"neither bag holds '{', '.join(lost)}'")
     except BagError as error:
         print(f'compare_bags: error: {error}', file=sys.stderr)
@@ -37,9 +37,9 @@ def compare_bags(arguments: Sequence[str] | None = None) -> int:
     for bag in bags:
         for note in bag.notes:
             print(f'compare_bags: {bag.path}: {note}', file=sys.stderr)
-    for key, topic in found.items():
+    for key, topic in comparisons.items():
         print('\n'.join(_lines(key, topic, options.tolerance)))
-    equal = all(topic.equal for topic in found.values())
+    equal = all(topic.equal for topic in comparisons.values())
     print('equal' if equal else 'different')
     return EQUAL if equal else DIFFERENT
 

@@ -22,13 +22,13 @@ def positions(rows: Records, radius: float) -> FloatArray:
 
     ``radius`` is r of (5) [m]. Gaps that no tilt can make give NaN tilts.
     """
-    found = np.full((len(rows), 2, 5), np.nan)
+    outputs = np.full((len(rows), 2, 5), np.nan)
     plant = rows['has_plant']
-    found[plant, 0] = rows['state'][plant][:, _OUTPUT_STATES]
+    outputs[plant, 0] = rows['state'][plant][:, _OUTPUT_STATES]
     measured = rows['has_measurement']
     some = rows[measured]
-    found[measured, 1] = outputs_of_gaps(some['gap'], some['x'], some['z'], radius)
-    return found
+    outputs[measured, 1] = outputs_of_gaps(some['gap'], some['x'], some['z'], radius)
+    return outputs
 
 
 def phase_currents(rows: Records, pole_pitch: float) -> FloatArray:

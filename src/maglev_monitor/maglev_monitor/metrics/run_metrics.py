@@ -98,7 +98,7 @@ class RunMetrics:
         """The content of ``metrics.json``; complete only when the run has reached its end."""
         run, source = self._run, 0 if self._seen['plant'] else 1
         sample_time = run.metrics.sample_time
-        found: dict[str, Any] = {
+        figures: dict[str, Any] = {
             'scenario': run.scenario,
             'stage': run.stage,
             'mode': run.mode,
@@ -113,7 +113,7 @@ class RunMetrics:
             'timing': self._timing.result(sample_time),
             'faults': self._fault_result(),
         }
-        return {**found, **verdict(found, run.limits, complete=self.ended)}
+        return {**figures, **verdict(figures, run.limits, complete=self.ended)}
 
     def _missing_result(self) -> dict[str, Any]:
         """By topic; a landing after a reference that was ended is no loss of the reference."""
@@ -309,9 +309,9 @@ class _Timing:
             'late_samples': last[2] - first[2],
         }
 
-    def _quantile(self, share: float) -> float | None:
+    def _quantile(self, fraction: float) -> float | None:
         total = int(self.histogram.sum())
         if not total:
             return None
-        number = int(np.searchsorted(np.cumsum(self.histogram), share * total))
+        number = int(np.searchsorted(np.cumsum(self.histogram), fraction * total))
         return (number + 0.5) * _TICK_RESOLUTION

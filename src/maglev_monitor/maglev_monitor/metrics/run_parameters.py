@@ -122,10 +122,10 @@ def run_from_json(text: str) -> RunParameters:
     Raises ParameterError for anything else.
     """
     try:
-        found: object = json.loads(text)
+        content: object = json.loads(text)
     except ValueError as error:
         raise ParameterError(f'the parameters of the run are no JSON: {error}') from error
-    if not isinstance(found, dict):
+    if not isinstance(content, dict):
         raise ParameterError('the parameters of the run are no JSON object')
-    named = {str(_FORMER_NAMES.get(name, name)): value for name, value in found.items()}
+    named = {str(_FORMER_NAMES.get(name, name)): value for name, value in content.items()}
     return build(RunParameters, named)

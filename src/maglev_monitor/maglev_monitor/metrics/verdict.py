@@ -11,16 +11,16 @@ from maglev_monitor.metrics.readable import angle_or_length, number
 from maglev_monitor.metrics.run_parameters import RunLimits
 
 
-def verdict(found: Mapping[str, Any], limits: RunLimits, *, complete: bool) -> dict[str, Any]:
+def verdict(figures: Mapping[str, Any], limits: RunLimits, *, complete: bool) -> dict[str, Any]:
     """The last part of ``metrics.json``: verdict, its reasons and the limits that were checked.
 
-    :param found: the figures, as :meth:`~.run_metrics.RunMetrics.result` gathers them.
+    :param figures: figures, as :meth:`~.run_metrics.RunMetrics.result` gathers them.
     :param complete: whether the run reached its end; otherwise it is ``incomplete`` or a failure.
     """
-    reasons = [f'fault in {fault}' for fault in found['faults']]
-    reasons += [*_axis_reasons(found, limits), *_step_reasons(found, limits)]
-    reasons += _other_reasons(found, limits)
-    if found['faults'] or (complete and reasons):
+    reasons = [f'fault in {fault}' for fault in figures['faults']]
+    reasons += [*_axis_reasons(figures, limits), *_step_reasons(figures, limits)]
+    reasons += _other_reasons(figures, limits)
+    if figures['faults'] or (complete and reasons):
         word = 'fail'
     else:
         word = 'pass' if complete else 'incomplete'
@@ -42,16 +42,16 @@ def checked_limits(limits: RunLimits) -> dict[str, Any]:
     return checked
 
 
-def _axis_reasons(found: Mapping[str, Any], limits: RunLimits) -> Iterator[str]:
+def _axis_reasons(figures: Mapping[str, Any], limits: RunLimits) -> Iterator[str]:
     rows = (
         ('mean_abs_error', 'mean |e|', limits.max_mean_error),
         ('max_abs_error', 'largest |e|', limits.max_error),
     )
-    tracked = found['axes']['y']['mean_abs_error'] is not None
+    tracked = figures['axes']['y']['mean_abs_error'] is not None
     for name, title, bounds in rows:
         for axis, bound in zip(AXES, bounds, strict=True):
-            value = found['axes'][axis][name]
-            if not tracked and found['steps']:
+            value = figures['axes'][axis][name]
+            if not tracked and figures['steps']:
                 continue  # a run of steps tracks nothing
             if bound < 0 or (value is not None and value <= bound):
                 continue
@@ -63,8 +63,8 @@ def _axis_reasons(found: Mapping[str, Any], limits: RunLimits) -> Iterator[str]:
                 yield f'{title} of {axis} is {shown}, allowed is {allowed}'
 
 
-def _step_reasons(found: Mapping[str, Any], limits: RunLimits) -> Iterator[str]:
-    for step in found['steps']:
+def _step_reasons(figures: Mapping[str, Any], limits: RunLimits) -> Iterator[str]:
+    for step in figures['steps']:
         axis = step['axis']
         start, target = angle_or_length(axis, step['from']), angle_or_length(axis, step['to'])
         name = f'step of {axis} from {start} to {target}'
@@ -82,20 +82,20 @@ def _step_reasons(found: Mapping[str, Any], limits: RunLimits) -> Iterator[str]:
             yield f'{name}: {symbol} is {shown}, allowed is {number(bound)} s'
 
 
-def _other_reasons(found: Mapping[str, Any], limits: RunLimits) -> Iterator[str]:
-    factor = found['timing']['real_time_factor'] or 0.0
+def _other_reasons(figures: Mapping[str, Any], limits: RunLimits) -> Iterator[str]:
+    factor = figures['timing']['real_time_factor'] or 0.0
     upper = (
-        ('peak phase current', found['currents']['peak_phase'], limits.max_phase_current, ' A'),
-        ('number of missing samples', found['missing_samples'], limits.max_missing_samples, ''),
-        ('number of late samples', found['timing']['late_samples'], limits.max_late_samples, ''),
+        ('peak phase current', figures['currents']['peak_phase'], limits.max_phase_current, ' A'),
+        ('number of missing samples', figures['missing_samples'], limits.max_missing_samples, ''),
+        ('number of late samples', figures['timing']['late_samples'], limits.max_late_samples, ''),
     )
     for title, value, bound, unit in upper:
         if bound >= 0 and value > bound * (1.0 + 1e-9):
             yield f'{title} is {number(value)}{unit}, allowed is {number(bound)}{unit}'
     lower = (
         ('real-time factor', factor, limits.min_real_time_factor),
-        ('number of measured samples', found['samples'], limits.min_samples),
-        ('number of measured steps', len(found['steps']), limits.min_steps),
+        ('number of measured samples', figures['samples'], limits.min_samples),
+        ('number of measured steps', len(figures['steps']), limits.min_steps),
     )
     for title, value, bound in lower:
         if value < bound:

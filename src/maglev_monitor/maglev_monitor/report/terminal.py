@@ -9,25 +9,30 @@ from maglev_model.axes import AXES
 from maglev_monitor.metrics.readable import angle_or_length, micro, number, seconds
 
 
-def as_text(found: Mapping[str, Any]) -> str:
+def as_text(figures: Mapping[str, Any]) -> str:
     """The content of ``metrics.json`` as lines of text."""
-    lines = [_title(found), *_tracking_lines(found), *_step_lines(found), *_other_lines(found)]
-    lines.append(f'verdict: {found["verdict"]}')
-    lines += [f'  {reason}' for reason in found['reasons']]
+    lines = [
+        _title(figures),
+        *_tracking_lines(figures),
+        *_step_lines(figures),
+        *_other_lines(figures),
+    ]
+    lines.append(f'verdict: {figures["verdict"]}')
+    lines += [f'  {reason}' for reason in figures['reasons']]
     return '\n'.join(lines)
 
 
-def _title(found: Mapping[str, Any]) -> str:
-    words = [found[key] for key in ('scenario', 'stage', 'mode') if found[key]]
+def _title(figures: Mapping[str, Any]) -> str:
+    words = [figures[key] for key in ('scenario', 'stage', 'mode') if figures[key]]
     name = ', '.join(words) or 'run'
     return (
-        f'{name}: {found["duration"]:g} s measured, {found["samples"]} samples,'
-        f' {found["error_source"]} position'
+        f'{name}: {figures["duration"]:g} s measured, {figures["samples"]} samples,'
+        f' {figures["error_source"]} position'
     )
 
 
-def _tracking_lines(found: Mapping[str, Any]) -> Iterator[str]:
-    axes = found['axes']
+def _tracking_lines(figures: Mapping[str, Any]) -> Iterator[str]:
+    axes = figures['axes']
     if axes['y']['mean_abs_error'] is None:
         return
     yield f'  {"tracking":<8}{"mean |e|":>16}{"rms e":>16}{"max |e|":>16}'
@@ -37,11 +42,11 @@ def _tracking_lines(found: Mapping[str, Any]) -> Iterator[str]:
         yield f'  {axis:<8}' + ''.join(f'{micro(axis, row[name]):>16}' for name in names)
 
 
-def _step_lines(found: Mapping[str, Any]) -> Iterator[str]:
-    if not found['steps']:
+def _step_lines(figures: Mapping[str, Any]) -> Iterator[str]:
+    if not figures['steps']:
         return
     yield f'  {"step":<8}{"from":>14}{"to":>14}{"overshoot":>12}{"t_s":>12}{"t_enc":>12}'
-    for step in found['steps']:
+    for step in figures['steps']:
         axis = step['axis']
         yield (
             f'  {axis:<8}{angle_or_length(axis, step["from"]):>14}'
@@ -50,8 +55,8 @@ def _step_lines(found: Mapping[str, Any]) -> Iterator[str]:
         )
 
 
-def _other_lines(found: Mapping[str, Any]) -> Iterator[str]:
-    currents, timing = found['currents'], found['timing']
+def _other_lines(figures: Mapping[str, Any]) -> Iterator[str]:
+    currents, timing = figures['currents'], figures['timing']
     rms = ' '.join(f'{value:.2f}' for value in currents['rms'])
     yield (
         f'  currents: peak phase {currents["peak_phase"]:.2f} A, rms {rms} A,'
@@ -65,6 +70,6 @@ def _other_lines(found: Mapping[str, Any]) -> Iterator[str]:
             f' {timing["late_samples"]} samples late'
         )
     missing = ', '.join(
-        f'{count} {key}' for key, count in found['missing_by_topic'].items() if count
+        f'{count} {key}' for key, count in figures['missing_by_topic'].items() if count
     )
-    yield f'  missing samples: {found["missing_samples"]}' + (f' ({missing})' if missing else '')
+    yield f'  missing samples: {figures["missing_samples"]}' + (f' ({missing})' if missing else '')
