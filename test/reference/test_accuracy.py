@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from pathlib import Path
 
@@ -12,7 +11,6 @@ import yaml
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
-from maglev_model.loop_parameters import AxisLoopParameters
 from maglev_model.parameters import ParameterError, build, from_yaml, read_yaml, replace
 from maglev_model.phases import Phase
 from maglev_plant.parameters import PlantParameters
