@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2] / 'src' / 'maglev_monitor' / 'maglev_monitor'
+ROOT = Path(__file__).resolve().parents[2] / 'src' / 'maglev_monitor' / 'maglev_monitor'
 STANDS_ON = {
     'metrics': {'metrics'},
     'bag': {'metrics', 'bag'},

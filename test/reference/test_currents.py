@@ -23,7 +23,7 @@ from maglev_reference.motion import Kinematics
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.timeline import Timeline
 
-PARAMS = Path(__file__).parents[2] / 'params'
+PARAMS = Path(__file__).resolve().parents[2] / 'params'
 MACHINE = machine_constants(MachineParameters())
 HOME = np.array([0.025, 0.0, 0.0, 0.0, 0.0])
 

@@ -10,7 +10,7 @@ from maglev_model.parameters import from_yaml, read_yaml
 from maglev_plant.parameters import PlantParameters
 from maglev_reference.parameters import ReferenceParameters
 
-PARAMS = Path(__file__).parents[2] / 'params'
+PARAMS = Path(__file__).resolve().parents[2] / 'params'
 TABLES = {
     'plant': PlantParameters,
     'hw_bridge': BridgeParameters,
