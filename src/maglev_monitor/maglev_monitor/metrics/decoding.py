@@ -27,6 +27,7 @@ class Field(NamedTuple):
     name: str
     kind: str
     length: int = 1
+    added: bool = False  # at the end of the message; bags from before do not have it
 
 
 class TopicType(NamedTuple):
@@ -62,6 +63,8 @@ TOPIC_TYPES = {
                 Field('x', '<f8'),
                 Field('z', '<f8'),
                 Field('late_samples', '<u8'),
+                Field('wall_time', '<u8', added=True),
+                Field('lockstep', '?', added=True),
             ),
         ),
         TopicType(
@@ -85,6 +88,7 @@ TOPIC_TYPES = {
                 Field('error_rate', '<f8', 5),
                 Field('virtual_input', '<f8', 5),
                 Field('internal_model', '<f8', 5),
+                Field('limited_by', '<u1', added=True),
             ),
         ),
         TopicType(
@@ -134,7 +138,7 @@ def decode(key: str, messages: Sequence[bytes]) -> Records:
     common = _record_type(key, 1, _size(key, 1))
     joined = np.zeros(len(parts), common)
     for index, part in enumerate(parts):
-        for name in common.names or ():
+        for name in part.dtype.names or ():
             joined[name][index] = part[name][0]
     return joined
 
@@ -155,11 +159,11 @@ def _frame_id_length(key: str, message: bytes) -> int:
     return int.from_bytes(message[_FRAME_ID_LENGTH], 'little')
 
 
-def _offsets(key: str, frame_id_length: int) -> tuple[list[int], int]:
+def _offsets(fields: Sequence[Field], frame_id_length: int) -> tuple[list[int], int]:
     """Offsets of the fields from the start of the serialized message, and its size [bytes]."""
     position = 12 + frame_id_length
     offsets = []
-    for field in TOPIC_TYPES[key].fields:
+    for field in fields:
         item = np.dtype(field.kind).itemsize
         position += -position % item
         offsets.append(position + len(_ENCAPSULATION))
@@ -168,17 +172,20 @@ def _offsets(key: str, frame_id_length: int) -> tuple[list[int], int]:
 
 
 def _size(key: str, frame_id_length: int) -> int:
-    return _offsets(key, frame_id_length)[1]
+    return _offsets(TOPIC_TYPES[key].fields, frame_id_length)[1]
 
 
 def _record_type(key: str, frame_id_length: int, size: int) -> np.dtype[np.void]:
-    offsets, needed = _offsets(key, frame_id_length)
+    fields: Sequence[Field] = TOPIC_TYPES[key].fields
+    offsets, needed = _offsets(fields, frame_id_length)
+    if size < needed:
+        fields = [field for field in fields if not field.added]
+        offsets, needed = _offsets(fields, frame_id_length)
     if not needed <= size < needed + 8:
         raise DecodeError(
             f'a {TOPIC_TYPES[key].message_type} has {size} bytes instead of {needed}: '
             'was it recorded with another version of maglev_msgs?'
         )
-    fields = TOPIC_TYPES[key].fields
     formats = [
         (field.kind, (field.length,)) if field.length > 1 else field.kind for field in fields
     ]

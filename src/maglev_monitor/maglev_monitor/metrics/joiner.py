@@ -48,7 +48,8 @@ def _row_type() -> np.dtype[np.void]:
 
 
 ROW = _row_type()
-"""One joined sample: ``sequence``, ``stamp`` of the measurement [ns], ``has_<topic>`` and the
+"""One joined sample: ``sequence``, ``stamp`` of the measurement by the wall clock [ns],
+``has_<topic>`` and the
 columns of each topic (all zero where the topic has no message for this sample)."""
 
 
@@ -146,6 +147,7 @@ class Joiner:
         self.duplicates += int(np.count_nonzero(present[rows]))
         present[rows] = True
         if key == 'measurement':
-            block['stamp'][rows] = stamps(records)
+            timed = 'wall_time' in (records.dtype.names or ())
+            block['stamp'][rows] = records['wall_time'] if timed else stamps(records)
         for column, source in _COLUMNS[key]:
             block[column][rows] = records[source]
