@@ -12,7 +12,6 @@ import pytest
 
 from maglev_model.stage import EncoderSample, Fault, StageError, Truth
 from maglev_msgs.msg import Currents, Measurement, PlantState
-from maglev_node import sampling as module
 from maglev_node.sampling import Sampling
 from maglev_node.stage_parameters import ClockedStageParameters
 
@@ -101,6 +100,17 @@ class Topic:
         return self.listeners
 
 
+class Inbox:
+    """The queue of currents in real time."""
+
+    def __init__(self) -> None:
+        self.messages: list[Any] = []
+
+    def take(self) -> Iterator[tuple[Any, int]]:
+        waiting, self.messages = self.messages, []
+        return ((message, 0) for message in waiting)
+
+
 class MadeUpNode:
     """What sampling asks of a node."""
 
@@ -113,13 +123,17 @@ class MadeUpNode:
         self.failed: list[str] = []
         self.timers: list[Any] = []
         self.fail = self.failed.append
+        self.inbox = Inbox()
 
     def create_publisher(self, message_type: type, _topic: str, _qos: Any) -> Topic:
         return self.topics.setdefault(message_type, Topic())
 
     def create_subscription(self, _type: type, _topic: str, callback: Any, _qos: Any) -> Any:
         self.answer = callback
-        return SimpleNamespace(get_publisher_count=lambda: 0)
+        return SimpleNamespace(topic_name='/stage/currents', get_publisher_count=lambda: 0)
+
+    def poll(self, _topic: str, _type: type) -> Inbox:
+        return self.inbox
 
     def create_timer(self, period: float, action: Any, clock: Any) -> Any:
         self.tick = action
@@ -138,22 +152,6 @@ class MadeUpNode:
         return self.topics[Measurement].sequences
 
 
-class Inbox:
-    """The queue of currents in real time."""
-
-    messages: list[Any]
-
-    def __init__(self, _node: Any) -> None:
-        Inbox.messages = []
-
-    def subscribe(self, _topic: str, _type: type) -> Inbox:
-        return self
-
-    def take(self) -> Iterator[tuple[Any, int]]:
-        waiting, Inbox.messages = Inbox.messages, []
-        return ((message, 0) for message in waiting)
-
-
 def currents(sequence: int, current: float = 0.0) -> Currents:
     return Currents(sequence=sequence, direct_current=[current] * 4)
 
@@ -165,10 +163,7 @@ def start(stage: MadeUpStage, **parameters: Any) -> tuple[Any, MadeUpNode]:
     return sampling, node
 
 
-def start_realtime(
-    stage: MadeUpStage, monkeypatch: pytest.MonkeyPatch, **parameters: Any
-) -> tuple[Any, MadeUpNode]:
-    monkeypatch.setattr(module, 'Queues', Inbox)
+def start_realtime(stage: MadeUpStage, **parameters: Any) -> tuple[Any, MadeUpNode]:
     return start(stage, mode='realtime', **parameters)
 
 
@@ -279,14 +274,12 @@ def test_a_restartable_one_waits_for_a_reset() -> None:
     assert node.failed == []
 
 
-def test_real_time_takes_the_newest_currents_and_counts_missing_ones(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_real_time_takes_the_newest_currents_and_counts_missing_ones() -> None:
     stage = MadeUpStage(real=True)
-    sampling, node = start_realtime(stage, monkeypatch)
+    sampling, node = start_realtime(stage)
     answers = ([0], [1, 2], [], [], [3, 4, 5], [6])  # to the samples that tick after tick follow
     for newest in answers:
-        Inbox.messages = [currents(number, 0.1 * number) for number in newest]
+        node.inbox.messages = [currents(number, 0.1 * number) for number in newest]
         node.tick()
     assert node.measured == [1, 2, 3, 4, 5, 6]
     assert stage.written == pytest.approx([0.0, 0.2, 0.5, 0.6])
@@ -298,14 +291,14 @@ def test_real_time_takes_the_newest_currents_and_counts_missing_ones(
     assert node.timers[0].timer_period_ns > 0
 
 
-def test_real_time_without_a_controller_nothing_is_late(monkeypatch: pytest.MonkeyPatch) -> None:
-    sampling, node = start_realtime(MadeUpStage(real=True), monkeypatch)
+def test_real_time_without_a_controller_nothing_is_late() -> None:
+    sampling, node = start_realtime(MadeUpStage(real=True))
     for _ in range(50):
         node.tick()
-    Inbox.messages = [currents(3)]  # it catches up with what it missed at its start
+    node.inbox.messages = [currents(3)]  # it catches up with what it missed at its start
     node.tick()
     assert (sampling.answered, sampling.late_samples) == (False, 0)
-    Inbox.messages = [currents(50)]
+    node.inbox.messages = [currents(50)]
     node.tick()
     assert sampling.answered
 
@@ -314,7 +307,7 @@ def test_a_stage_without_a_clock_gives_up_when_it_is_too_late(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     stage = MadeUpStage()
-    sampling, node = start_realtime(stage, monkeypatch, overrun_limit=0.5)
+    sampling, node = start_realtime(stage, overrun_limit=0.5)
     begun = time.monotonic()
     monkeypatch.setattr(sampling._pace, '_clock', lambda: begun + 0.3)
     for _ in range(4):

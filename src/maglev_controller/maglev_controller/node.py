@@ -17,10 +17,16 @@ from maglev_model.phases import Phase
 from maglev_msgs.msg import ControllerState, Currents, Measurement, Reference
 from maglev_node.graph_guard import GraphGuard
 from maglev_node.node import MaglevNode, SourceParameters
-from maglev_node.polling import Queues
 from maglev_node.process import main as run_main
 from maglev_node.stamp import copy_stamp, stamp_now
-from maglev_node.topics import CONTROLLER_STATE, CURRENTS, MEASUREMENT, REFERENCE, sample_qos
+from maglev_node.topics import (
+    CONTROLLER_STATE,
+    CURRENTS,
+    MEASUREMENT,
+    REFERENCE,
+    reference_qos,
+    sample_qos,
+)
 
 _REFERENCE_PERIOD = 2e-3  # between two looks at what references have arrived [s]
 _HAND_PERIOD = 2e-4  # between two looks at the queues during a redesign [s]
@@ -74,8 +80,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         self._state_publisher = self.create_publisher(
             ControllerState, CONTROLLER_STATE, sample_qos()
         )
-        self._queues = Queues(self)
-        self._references = self._queues.subscribe(REFERENCE, Reference)
+        self._references = self.poll(REFERENCE, Reference, reference_qos())
         self._measurements = self.create_subscription(
             Measurement, MEASUREMENT, self._on_measurement, sample_qos()
         )
@@ -88,7 +93,9 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         for line in self.supervisor.regulator.describe_loops():
             self.get_logger().info(line)
         # The first line a process logs takes 20 ms, so it must not be one that is logged in flight.
-        self.get_logger().info(f'{self.parameters.mode}, waiting for {MEASUREMENT}')
+        self.get_logger().info(
+            f'{self.parameters.mode}, waiting for {self._measurements.topic_name}'
+        )
 
     def _take_references(self) -> None:
         """Take what has arrived ahead of time, in bursts: being woken for each slows the loop."""
@@ -273,7 +280,6 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         self.supervisor.cut('shut down')
         if self._sequence >= 0:
             self._publish_currents(self._sequence)
-        self._queues.destroy()
 
 
 def main() -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from typing import Any
 
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
 from maglev_node.node import MaglevNode, NodeError
 
 DISCOVERY_TIME = 1.0
@@ -37,7 +39,7 @@ class GraphGuard:
             time.sleep(0.02)
         publishers = self._node.get_publishers_info_by_topic(topic)
         if publishers:
-            raise NodeError(self._taken(topic, kind, publishers[0].node_name))
+            raise NodeError(self._taken(topic, kind, publishers[0]))
         first_claim = not self._topic
         self._topic, self._kind = topic, kind
         if first_claim:
@@ -49,7 +51,7 @@ class GraphGuard:
         """Whether what was claimed still has one publisher; otherwise the node ends."""
         publishers = self._node.get_publishers_info_by_topic(self._topic)
         if len(publishers) > 1:
-            self._node.fail(self._taken(self._topic, self._kind, publishers[0].node_name))
+            self._node.fail(self._taken(self._topic, self._kind, publishers[0]))
         return len(publishers) <= 1
 
     def on_probation(self) -> bool:
@@ -65,9 +67,9 @@ class GraphGuard:
         if not self.on_probation():
             self._timer.cancel()
 
-    @staticmethod
-    def _taken(topic: str, kind: str, who: str) -> str:
+    def _taken(self, topic: str, kind: str, who: TopicEndpointInfo) -> str:
+        name = f'{who.node_namespace.rstrip("/")}/{who.node_name}'
         return (
-            f"{topic} is already published by '{who}': there is another {kind} on this graph;"
-            ' stop it, or use another ROS_DOMAIN_ID'
+            f"{self._node.resolve_topic_name(topic)} is already published by '{name}': there is"
+            f' another {kind} on this graph; stop it, or use another namespace or ROS_DOMAIN_ID'
         )

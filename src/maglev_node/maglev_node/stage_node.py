@@ -89,7 +89,8 @@ class StageNode(ManagedNode[P], Generic[P, S]):
 
     def activate(self) -> None:
         """Take the first sample and begin to sample."""
-        self.get_logger().info(f'{self.parameters.mode}, waiting for a controller on {CURRENTS}')
+        where = self.resolve_topic_name(CURRENTS)
+        self.get_logger().info(f'{self.parameters.mode}, waiting for a controller on {where}')
         self.take_realtime_priority()
         self.sampling.start()
 
