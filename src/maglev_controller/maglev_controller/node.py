@@ -93,9 +93,8 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         for line in self.supervisor.regulator.describe_loops():
             self.get_logger().info(line)
         # The first line a process logs takes 20 ms, so it must not be one that is logged in flight.
-        self.get_logger().info(
-            f'{self.parameters.mode}, waiting for {self._measurements.topic_name}'
-        )
+        where = self._measurements.topic_name
+        self.get_logger().info(f'{self.parameters.mode}, waiting for {where}')
 
     def _take_references(self) -> None:
         """Take what has arrived ahead of time, in bursts: being woken for each slows the loop."""

@@ -125,7 +125,8 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
     def _waiting_for(self) -> str:
         there = self._listeners()
         if there < self._expected:
-            return f'waiting for {self._expected} subscribers of {self._publisher.topic_name}, {there} are there'
+            where = self._publisher.topic_name
+            return f'waiting for {self._expected} subscribers of {where}, {there} are there'
         if self._measurements.publisher_count() == 0:
             return f'waiting for a stage on {self._measurements.topic}'
         return f'waiting for the controller to answer on {self.resolve_topic_name(CURRENTS)}'
