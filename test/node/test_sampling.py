@@ -14,6 +14,7 @@ from maglev_model.stage import EncoderSample, Fault, StageError, Truth
 from maglev_msgs.msg import Currents, Measurement, PlantState
 from maglev_node.sampling import Sampling
 from maglev_node.stage_parameters import ClockedStageParameters
+from maglev_node.topics import MEASUREMENT, TRUE_STATE
 
 ZERO = np.zeros(4)
 
@@ -90,14 +91,10 @@ class Topic:
     def __init__(self) -> None:
         self.sequences: list[int] = []
         self.newest: Any = None
-        self.listeners = 1
 
     def publish(self, message: Any) -> None:
         self.sequences.append(message.sequence)
         self.newest = message
-
-    def get_subscription_count(self) -> int:
-        return self.listeners
 
 
 class Inbox:
@@ -124,6 +121,14 @@ class MadeUpNode:
         self.timers: list[Any] = []
         self.fail = self.failed.append
         self.inbox = Inbox()
+        self.subscribers: dict[str, list[str]] = {}
+
+    def get_namespace(self) -> str:
+        return '/'
+
+    def get_subscriptions_info_by_topic(self, topic: str) -> list[Any]:
+        names = self.subscribers.get(topic, [])
+        return [SimpleNamespace(node_name=name, node_namespace='/') for name in names]
 
     def create_publisher(self, message_type: type, _topic: str, _qos: Any) -> Topic:
         return self.topics.setdefault(message_type, Topic())
@@ -182,14 +187,22 @@ def test_lockstep_repeats_the_first_sample_and_waits_for_each_answer() -> None:
 
 
 def test_the_first_answer_waits_for_those_who_watch() -> None:
-    _, node = start(MadeUpStage(truth=True), watchers=2)
+    sampling, node = start(MadeUpStage(truth=True), watchers=('monitor', 'recorder'))
+    everybody = ['stranger', 'monitor', 'recorder', 'stranger']
+
+    def answered_when(measurement: list[str], true_state: list[str]) -> bool:
+        node.subscribers = {MEASUREMENT: measurement, TRUE_STATE: true_state}
+        for pause in (0.0, 0.15):  # the middleware gets the time to match them
+            time.sleep(pause)
+            node.answer(currents(0))
+        return node.measured == [0, 1]
+
     node.tick()
-    node.topics[Measurement].listeners = 4
-    node.answer(currents(0))
-    assert node.measured == [0]
-    node.topics[PlantState].listeners = 2
-    node.answer(currents(0))
-    assert node.measured == [0, 1]
+    assert not answered_when(['stranger'] * 9, ['stranger'] * 9)
+    assert sampling.awaited() == 'monitor, recorder'
+    assert not answered_when(everybody, ['monitor'])
+    assert sampling.awaited() == 'recorder'
+    assert answered_when(everybody, everybody)
 
 
 def test_the_truth_goes_out_beside_the_measurement() -> None:

@@ -1,10 +1,12 @@
-"""One node of a kind on the graph: others are looked for, and the later one leaves."""
+"""Who is on the graph: one node of a kind, of which the later leaves; and who shall watch."""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 from typing import Any
 
+from rclpy.node import Node
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from maglev_node.node import MaglevNode, NodeError
@@ -16,6 +18,8 @@ _PROBATION = 5.0
 """How long it goes on looking afterwards, and is the one to leave [s]."""
 
 _LOOK_PERIOD = 0.25  # [s]
+_MATCHING = 0.1  # at most, from when the graph shows a subscription to when it gets messages [s]
+_REMINDER = 5.0  # between two lines about who is waited for [s]
 
 
 class GraphGuard:
@@ -73,3 +77,49 @@ class GraphGuard:
             f"{self._node.resolve_topic_name(topic)} is already published by '{name}': there is"
             f' another {kind} on this graph; stop it, or use another namespace or ROS_DOMAIN_ID'
         )
+
+
+class Watchers:
+    """Nodes, by name and in the namespace of ``node``, that shall see all that it publishes.
+
+    Whoever else subscribes counts for nothing.
+    """
+
+    def __init__(self, node: Node, names: Iterable[str]) -> None:
+        self._node, self._names = node, tuple(names)
+        self._since: dict[tuple[str, str], float] = {}  # that a name subscribes to a topic [s]
+        self._reminded = time.monotonic()
+
+    def missing(self, *topics: str) -> list[str]:
+        """Those that do not yet get what is published on all of these topics."""
+        ready = set(self._names)
+        if self._names:
+            for topic in topics:
+                ready &= self._ready(topic)
+        return [name for name in self._names if name not in ready]
+
+    def there(self, *topics: str) -> bool:
+        """Whether none is missing; now and then says who is."""
+        missing = self.missing(*topics)
+        if missing and time.monotonic() - self._reminded > _REMINDER:
+            self._reminded = time.monotonic()
+            names = ', '.join(missing)
+            where = ' and '.join(self._node.resolve_topic_name(topic) for topic in topics)
+            self._node.get_logger().info(f'waiting for {names} to subscribe to {where}')
+        return not missing
+
+    def _ready(self, topic: str) -> set[str]:
+        here, now = self._node.get_namespace(), time.monotonic()
+        subscribed = {
+            reader.node_name
+            for reader in self._node.get_subscriptions_info_by_topic(topic)
+            if reader.node_namespace == here
+        }
+        for name in self._names:
+            if name in subscribed:
+                self._since.setdefault((name, topic), now)
+            else:
+                self._since.pop((name, topic), None)
+        return {
+            name for name in subscribed if now - self._since.get((name, topic), now) > _MATCHING
+        }

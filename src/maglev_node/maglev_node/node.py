@@ -58,11 +58,9 @@ class SourceParameters(NodeParameters):
         description='realtime: SCHED_FIFO priority of the process, where permitted; 0: none',
         read_only=True,
     )
-    watchers: int = parameter(
-        0,
-        lower=0,
-        upper=100,
-        description='nodes that watch every sample (monitor, recorder), waited for at the start',
+    watchers: tuple[str, ...] = parameter(
+        (),
+        description='names of nodes in this namespace that watch every sample, waited for at start',
         read_only=True,
     )
 

@@ -99,6 +99,10 @@ class Sampling(Generic[P, S]):
         self.stage.land(why)
         self._go_on_alone()
 
+    def awaited(self) -> str:
+        """Who is waited for before the first sample is answered."""
+        return ', '.join(self._publisher.missing()) or 'a controller'
+
     def emergency_stop(self) -> str:
         """Latch a fault; returns what comes of it."""
         self.stage.stop()
@@ -127,7 +131,7 @@ class Sampling(Generic[P, S]):
     def _on_answer(self, message: Currents) -> None:
         if message.sequence != self.sequence or self._timer is None:
             return
-        if not (self.answered or self._publisher.watched(self._node.parameters.watchers)):
+        if not (self.answered or self._publisher.watched()):
             return
         self.answered = True
         self._apply(message.direct_current, message.quadrature_current)

@@ -148,7 +148,7 @@ class StageNode(ManagedNode[P], Generic[P, S]):
         if self.state != 'active':
             return DiagnosticStatus.OK, self.state, facts
         if not sampling.answered:
-            return DiagnosticStatus.WARN, 'waiting for a controller', facts
+            return DiagnosticStatus.WARN, f'waiting for {sampling.awaited()}', facts
         if not sampling.armed:
             return (
                 DiagnosticStatus.WARN,

@@ -15,7 +15,7 @@ from maglev_model.parameters import parameter
 from maglev_model.phases import Phase
 from maglev_model.platen import outputs_of_gaps
 from maglev_msgs.msg import Currents, Measurement, Reference
-from maglev_node.graph_guard import GraphGuard
+from maglev_node.graph_guard import GraphGuard, Watchers
 from maglev_node.node import MaglevNode, SourceParameters
 from maglev_node.process import main as run_main
 from maglev_node.stamp import stamp_now
@@ -83,7 +83,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         self._graph = GraphGuard(self)
         self._graph.claim(REFERENCE, 'reference')
         self._run = ReferenceRun(self.parameters, self.parameters.lead, self.parameters.autostart)
-        self._expected = self.parameters.watchers + 1  # and the controller
+        self._watchers = Watchers(self, self.parameters.watchers)
         self._seen = self._reminded = time.monotonic()
         self._message = Reference()
         self._message.header.frame_id = 'stage'
@@ -113,20 +113,17 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
 
     def _wait(self, measurement: Measurement | None) -> None:
         answered = self._answers is None or any(self._answers.take(1))
-        if measurement is not None and answered and self._listeners() >= self._expected:
+        if measurement is not None and answered and not self._watchers.missing(REFERENCE):
             self._start(measurement)
         elif time.monotonic() - self._reminded > _REMINDER:
             self._reminded = time.monotonic()
             self.get_logger().info(self._waiting_for())
 
-    def _listeners(self) -> int:
-        return int(self._publisher.get_subscription_count())
-
     def _waiting_for(self) -> str:
-        there = self._listeners()
-        if there < self._expected:
+        missing = self._watchers.missing(REFERENCE)
+        if missing:
             where = self._publisher.topic_name
-            return f'waiting for {self._expected} subscribers of {where}, {there} are there'
+            return f'waiting for {", ".join(missing)} to subscribe to {where}'
         if self._measurements.publisher_count() == 0:
             return f'waiting for a stage on {self._measurements.topic}'
         return f'waiting for the controller to answer on {self.resolve_topic_name(CURRENTS)}'
