@@ -330,15 +330,6 @@ class _Loader(yaml.SafeLoader):
     Refuses a mapping that names a key twice, of which YAML would silently take the last.
     """
 
-    yaml_implicit_resolvers: typing.ClassVar[dict[Any, Any]] = {
-        first: [
-            (tag, pattern)
-            for tag, pattern in resolvers
-            if tag.split(':')[-1] not in ('timestamp', *_NUMBERS)
-        ]
-        for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
-    }
-
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         """Raises yaml.YAMLError with the key and its line."""
         seen: set[Any] = set()
@@ -357,6 +348,10 @@ class _Dumper(yaml.SafeDumper):
 
 
 _Dumper.add_implicit_resolver('tag:yaml.org,2002:bool', re.compile('^[yYnN]$'), list('yYnN'))
+_Loader.yaml_implicit_resolvers = {
+    first: [each for each in resolvers if each[0].split(':')[-1] not in ('timestamp', *_NUMBERS)]
+    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
 for _kind, _pattern in _NUMBERS.items():
     for _each in (_Loader, _Dumper):
         _each.add_implicit_resolver(
