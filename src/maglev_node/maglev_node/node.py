@@ -7,7 +7,7 @@ import os
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
@@ -76,6 +76,9 @@ class MaglevNode(PollingNode, Generic[P]):
     A subclass ends the process by :meth:`finish`; what it must do last (no current, a closed bag)
     it does in :meth:`close`, which runs however the process ends, publishers still working.
     """
+
+    interface: ClassVar[Mapping[str, str]] = {}
+    """The topics and services of the node, each with what it is, for ``--help``."""
 
     def __init__(self, name: str, parameter_table: type[P], **node_options: Any) -> None:
         super().__init__(name, **node_options)
