@@ -179,7 +179,8 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         copy_stamp(self._currents.header.stamp, message.header.stamp)
         message.sequence = sequence
         message.mode = int(self.supervisor.mode)
-        message.saturated = self.supervisor.saturated
+        message.limited_by = self.supervisor.limited_by
+        message.saturated = message.limited_by != 0
         message.position = regulator.position
         message.error = regulator.error
         message.error_rate = regulator.error_rate

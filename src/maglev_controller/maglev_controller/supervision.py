@@ -35,7 +35,8 @@ class Supervisor:
     Without current the platen is slammed into the upper stop from anywhere above the equilibrium,
     so while the measurement can be believed every way out of flight is a landing; only when it
     cannot, the currents are cut at once. ``direct_current`` and ``quadrature_current`` (4,) [A]
-    hold the answer of the last :meth:`step`.
+    hold the answer of the last :meth:`step`, ``limited_by`` what limited it, as bits of
+    :mod:`maglev_model.inverse`.
     """
 
     def __init__(self, parameters: ControllerParameters, *, enabled: bool = True) -> None:
@@ -45,7 +46,7 @@ class Supervisor:
         self.references = ReferenceBuffer()
         self.mode = Mode.WAITING if enabled else Mode.DISABLED
         self.reason = '' if enabled else 'not enabled'
-        self.saturated = False
+        self.limited_by = 0
         self.direct_current: FloatArray = np.zeros(4)
         self.quadrature_current: FloatArray = np.zeros(4)
         self._landing: Landing | None = None
@@ -197,7 +198,7 @@ class Supervisor:
         acceleration: FloatArray,
     ) -> None:
         try:
-            self.saturated = self.regulator.step(
+            self.limited_by = self.regulator.step(
                 gap,
                 x,
                 z,
@@ -213,4 +214,4 @@ class Supervisor:
     def _no_current(self) -> None:
         self.direct_current[:] = 0.0
         self.quadrature_current[:] = 0.0
-        self.saturated = False
+        self.limited_by = 0
