@@ -39,7 +39,7 @@ class Run:
     @property
     def saturated(self) -> NDArray[np.bool_]:
         """Whether some current was limited (n,)."""
-        return self.limited_by != 0
+        return np.asarray(self.limited_by != 0)
 
     @property
     def output(self) -> FloatArray:
