@@ -11,7 +11,8 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import SetBool, Trigger
 
 from maglev_controller.parameters import ControllerParameters
-from maglev_controller.supervision import Mode, Supervisor
+from maglev_controller.supervision import Supervisor
+from maglev_model.modes import Mode
 from maglev_model.parameters import build, parameter, specs, values
 from maglev_model.phases import Phase
 from maglev_msgs.msg import ControllerState, Currents, Measurement, Reference

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import enum
-
 import numpy as np
 
 from maglev_controller.bumpless_transfer import ModelMaps, check_retuning
@@ -13,18 +11,8 @@ from maglev_controller.parameters import ControllerParameters
 from maglev_controller.reference_buffer import ReferenceBuffer
 from maglev_controller.regulator import MeasurementFault, Regulator
 from maglev_model.axes import FloatArray
+from maglev_model.modes import Mode
 from maglev_model.phases import Phase
-
-
-class Mode(enum.IntEnum):
-    """What the controller is doing; the values of ``ControllerState.mode``."""
-
-    DISABLED = 0  # no current
-    WAITING = 1  # enabled, no current wanted
-    REGULATING = 2
-    LANDING = 3  # by itself
-    FAULT = 4  # latched, no current
-
 
 _FLYING_MARGIN = 5e-4  # above the lower stop, beyond encoder and stop compliance [m]
 
@@ -51,6 +39,7 @@ class Supervisor:
         self.quadrature_current: FloatArray = np.zeros(4)
         self._landing: Landing | None = None
         self._row = -1  # of the reference last followed
+        self._may_lift_off = enabled  # a reference in flight is not followed from its middle
         self._segment = -1
         self._lower_stop = parameters.machine.gap_max
 
@@ -89,8 +78,11 @@ class Supervisor:
         """Follow the reference from its next lift-off on; refused while a fault is latched."""
         if self.mode == Mode.FAULT:
             return False, f'{self.reason}; reset first'
+        if self.mode == Mode.LANDING:
+            return False, f'{self.reason}: landing by itself; enable when that is over'
         if self.mode == Mode.DISABLED:
             self.mode, self.reason = Mode.WAITING, ''
+            self._may_lift_off = False
         return True, 'enabled'
 
     def disable(self) -> tuple[bool, str]:
@@ -119,6 +111,7 @@ class Supervisor:
         self.references.stage_began_anew()
         if self.flying:
             self.mode, self.reason = Mode.WAITING, ''
+            self._may_lift_off = False
         self._no_current()
 
     def step(self, row: int, gap: FloatArray, x: float, z: float) -> None:
@@ -128,9 +121,8 @@ class Supervisor:
         flight means that the reference is lost.
         """
         self.references.renewed = False
-        if self.mode == Mode.WAITING and row >= 0 and self._wants_current(row):
-            self.regulator.reset()
-            self.mode = Mode.REGULATING
+        if self.mode == Mode.WAITING and row >= 0:
+            self._await_lift_off(row)
         elif self.mode == Mode.REGULATING and row < 0:
             self._land('the reference stopped')
         elif self.mode == Mode.REGULATING and not self._wants_current(row):
@@ -141,6 +133,14 @@ class Supervisor:
             self._descend(gap, x, z)
         else:
             self._no_current()
+
+    def _await_lift_off(self, row: int) -> None:
+        """Regulate from a lift-off on whose rest before it was seen since the enable."""
+        if not self._wants_current(row):
+            self._may_lift_off = True
+        elif self._may_lift_off:
+            self.regulator.reset()
+            self.mode = Mode.REGULATING
 
     def _wants_current(self, row: int) -> bool:
         return self.references.phase[row] not in (Phase.REST, Phase.END)
