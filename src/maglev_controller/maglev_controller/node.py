@@ -17,9 +17,10 @@ from maglev_model.parameters import build, parameter, specs, values
 from maglev_model.phases import Phase
 from maglev_msgs.msg import ControllerState, Currents, Measurement, Reference
 from maglev_node.graph_guard import GraphGuard, Watchers
+from maglev_node.mode_check import mode_conflict
 from maglev_node.node import MaglevNode, SourceParameters
 from maglev_node.process import main as run_main
-from maglev_node.stamp import copy_stamp, stamp_now
+from maglev_node.stamp import copy_stamp
 from maglev_node.topics import (
     CONTROLLER_STATE,
     CURRENTS,
@@ -118,6 +119,8 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
 
     def _on_measurement(self, message: Measurement) -> None:
         sequence = message.sequence
+        if self._in_another_mode(message):
+            return
         if self._sequence < 0 and not self._watchers.there(CURRENTS, CONTROLLER_STATE):
             return
         if sequence == self._sequence:  # repeated: the answer was not heard
@@ -142,6 +145,14 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
             return
         self._answer(message)
 
+    def _in_another_mode(self, message: Measurement) -> bool:
+        """Whether the stage runs in another mode than ours, with which there is no working."""
+        if message.lockstep == self._lockstep:
+            return False
+        if not self.supervisor.flying:  # in flight it is a second one, which will leave
+            self.fail(mode_conflict(self.parameters.mode, message.lockstep))
+        return True
+
     def _awaits_reference(self, sequence: int) -> bool:
         supervisor = self.supervisor
         if self._reference_lost or supervisor.mode not in (Mode.WAITING, Mode.REGULATING):
@@ -154,6 +165,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
     def _answer(self, message: Measurement) -> None:
         self._pending = None
         self._answered = time.monotonic()
+        copy_stamp(message.header.stamp, self._currents.header.stamp)
         supervisor = self.supervisor
         sequence = self._sequence = message.sequence
         row = supervisor.references.find(sequence)
@@ -167,7 +179,6 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
 
     def _publish_currents(self, sequence: int) -> None:
         message = self._currents
-        stamp_now(message.header.stamp)
         message.sequence = sequence
         message.direct_current = self.supervisor.direct_current
         message.quadrature_current = self.supervisor.quadrature_current
@@ -278,3 +289,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
 def main() -> None:
     """Entry point of the executable ``controller``."""
     run_main(ControllerNode, 'controller')
+
+
+if __name__ == '__main__':
+    main()

@@ -18,9 +18,10 @@ from maglev_model.phases import Phase
 from maglev_model.platen import outputs_of_gaps
 from maglev_msgs.msg import ControllerState, Measurement, Reference
 from maglev_node.graph_guard import GraphGuard, Watchers
+from maglev_node.mode_check import mode_conflict
 from maglev_node.node import MaglevNode, SourceParameters
 from maglev_node.process import main as run_main
-from maglev_node.stamp import stamp_now
+from maglev_node.stamp import nanoseconds, set_stamp
 from maglev_node.topics import (
     CONTROLLER_STATE,
     MEASUREMENT,
@@ -109,11 +110,12 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         self.take_realtime_priority()
 
     def _poll(self) -> None:
+        """Take what is new, and publish what is due."""
         for state, _ in self._states.take(1):
             self._run.observe_controller(Mode(state.mode), int(state.sequence))
         news = False
         for message, _ in self._measurements.take(1):
-            if self._run.observe(int(message.sequence)):
+            if self._run.observe(int(message.sequence)) and self._in_one_mode(message):
                 news, self._measured, self._seen = True, message, time.monotonic()
         if not self._run.started:
             self._wait(news)
@@ -123,6 +125,13 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
             self._give_way()
             self._publish()
             self._follow_phase()
+
+    def _in_one_mode(self, message: Measurement) -> bool:
+        """Whether the stage runs in our mode; in flight no other one can come."""
+        conflict = mode_conflict(self.parameters.mode, message.lockstep)
+        if conflict and self._run.grounded:
+            self.fail(conflict)
+        return not conflict
 
     def _wait(self, news: bool) -> None:
         # In real time nobody waits for the controller but us; in lockstep it waits for us.
@@ -195,14 +204,17 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         if slowly and time.monotonic() - self._published < _IDLE_PERIOD:
             return
         due = self._run.due(slowly=slowly)
-        if due is None:
+        if due is None or self._measured is None:
             return
         first, block = due
         self._published = time.monotonic()
         message = self._message
-        stamp_now(message.header.stamp)
+        stage_time = nanoseconds(self._measured.header.stamp)
+        period = round(1e9 * self.parameters.sample_time)
         for row in range(len(block.phase)):
             message.sequence = first + row
+            ahead = first + row - self._run.newest
+            set_stamp(message.header.stamp, stage_time + ahead * period)
             message.phase = int(block.phase[row])
             message.segment = int(block.segment[row])
             message.position = block.position[row]
