@@ -131,10 +131,13 @@ def test_at_rest_it_goes_on_resting_until_lift_off(mode):
     assert run.give_way()
     assert not run.give_way()
     assert run.obstacle()[1][-1] == 'enable'
-    run.observe(50)
-    assert (run.due()[1].phase == Phase.REST).all()
-    run.observe_controller(Mode.WAITING, 50)
+    for sequence in range(0, 1200, 60):
+        run.observe(sequence)
+        assert run.idle == (sequence >= 1000)
+        assert (run.due()[1].phase == Phase.REST).all()
+    run.observe_controller(Mode.WAITING, run.newest)
     assert not run.give_way()
+    run.observe(1200)
     assert run.idle
     assert run.obstacle() == ('', ())
     assert run.lift_off(REST)

@@ -32,6 +32,8 @@ from maglev_node.topics import (
 
 _REFERENCE_PERIOD = 2e-3  # between two looks at what references have arrived [s]
 _HAND_PERIOD = 2e-4  # between two looks at the queues during a redesign [s]
+_WATCH_PERIOD = 0.05  # between two looks at an answer that waits [s]
+_IDLE_PATIENCE = 0.04  # for a reference without which nothing is lost [s]
 _SILENCE = 0.5  # without a sample for this long the stage is taken for stopped [s]
 
 
@@ -91,7 +93,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         self.create_service(Trigger, '~/emergency_stop', self._on_emergency_stop)
         self.create_service(Trigger, '~/reset', self._on_reset)
         self.create_timer(_REFERENCE_PERIOD, self._take_references, clock=self.steady_clock)
-        self.create_timer(0.05, self._watch, clock=self.steady_clock)
+        self.create_timer(_WATCH_PERIOD, self._watch, clock=self.steady_clock)
         self.take_realtime_priority()
         for line in self.supervisor.regulator.describe_loops():
             self.get_logger().info(line)
@@ -154,13 +156,13 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         return True
 
     def _awaits_reference(self, sequence: int) -> bool:
+        """Whether an answer waits; without current only so that the loop sleeps, see _watch."""
         supervisor = self.supervisor
-        if self._reference_lost or supervisor.mode not in (Mode.WAITING, Mode.REGULATING):
+        if self._reference_lost or supervisor.mode == Mode.LANDING:
             return False
-        references = supervisor.references
-        if self._reference_over and sequence > references.newest:
+        if supervisor.mode in (Mode.DISABLED, Mode.FAULT) and supervisor.references.newest < 0:
             return False
-        return references.find(sequence) < 0
+        return supervisor.references.find(sequence) < 0
 
     def _answer(self, message: Measurement) -> None:
         self._pending = None
@@ -207,11 +209,17 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
             self.get_logger().info(text)
 
     def _watch(self) -> None:
-        """In lockstep, give a lost reference up: the answer that waits for it starts a landing."""
+        """In lockstep, give a lost reference up: the answer that waits for it starts a landing.
+
+        Where no current is wanted there is nothing to lose.
+        """
         if self._pending is None or self.supervisor.references.newest < 0:
             return
-        if time.monotonic() - self._pending_since > self.parameters.reference_timeout:
-            self._reference_lost = True
+        waiting = self.supervisor.mode == Mode.WAITING
+        needless = not self.supervisor.flying and (self._reference_over or not waiting)
+        patience = _IDLE_PATIENCE if needless else self.parameters.reference_timeout
+        if time.monotonic() - self._pending_since > patience:
+            self._reference_lost = not needless
             self._answer(self._pending)
 
     def may_stop(self) -> bool:

@@ -14,6 +14,7 @@ from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.timeline import Block, Timeline
 
 _BURST = 128  # samples due at one time, at most; half of what a reader's queue holds
+_STILL = 1.0  # after which a platen on the ground lies still [s]
 
 _GROUND = (Phase.REST, Phase.END)
 
@@ -56,9 +57,12 @@ class ReferenceRun:
 
     @property
     def idle(self) -> bool:
-        """Whether it rests until :meth:`lift_off`."""
-        sample = self.newest - self._origin
-        return self._timeline is not None and self._timeline.settled(sample)
+        """Whether it has rested for a while, and goes on until :meth:`lift_off`.
+
+        The while is for what may still move after a run that was left.
+        """
+        sample = self.newest - self._origin - round(_STILL / self._parameters.sample_time)
+        return self._timeline is not None and self._timeline.settled(max(sample, 0))
 
     @property
     def over(self) -> bool:
