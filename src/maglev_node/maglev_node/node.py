@@ -79,7 +79,7 @@ class MaglevNode(PollingNode, Generic[P]):
 
     def __init__(self, name: str, parameter_table: type[P], **node_options: Any) -> None:
         super().__init__(name, automatically_declare_parameters_from_overrides=True, **node_options)
-        self.parameters: P = ros_parameters.declare(self, parameter_table)
+        self.parameters: P = ros_parameters.declare(self, name, parameter_table)
         self.add_on_set_parameters_callback(self._on_set_parameters)
         self.steady_clock = Clock(clock_type=ClockType.STEADY_TIME)
         self._finished: Future = Future()
