@@ -8,6 +8,7 @@ from maglev_controller.bumpless_transfer import ModelMaps, check_retuning
 from maglev_controller.design_process import DesignProcess
 from maglev_controller.landing import Landing
 from maglev_controller.parameters import ControllerParameters
+from maglev_controller.platen_lost import PlatenWatch
 from maglev_controller.reference_buffer import ReferenceBuffer
 from maglev_controller.regulator import MeasurementFault, Regulator
 from maglev_model.axes import FloatArray
@@ -38,6 +39,7 @@ class Supervisor:
         self.direct_current: FloatArray = np.zeros(4)
         self.quadrature_current: FloatArray = np.zeros(4)
         self._landing: Landing | None = None
+        self._platen_watch = PlatenWatch(parameters)
         self._row = -1  # of the reference last followed
         self._may_lift_off = enabled  # a reference in flight is not followed from its middle
         self._segment = -1
@@ -50,6 +52,8 @@ class Supervisor:
         rest = np.array([self._lower_stop, 0.0, 0.0, 0.0, 0.0])
         self._regulate(np.full(4, self._lower_stop), 0.0, 0.0, rest, np.zeros(5), np.zeros(5))
         Landing(self.parameters, rest, np.zeros(5), np.zeros(5)).step()
+        self._platen_watch.step(self.regulator.position, self.regulator.error)
+        self._platen_watch.reset()
         self.regulator.reset()
         self._no_current()
 
@@ -72,6 +76,7 @@ class Supervisor:
         if self.flying:
             regulator.take_over(self.regulator, maps)
         self.regulator, self.parameters = regulator, regulator.parameters
+        self._platen_watch = PlatenWatch(regulator.parameters)
         self._lower_stop = regulator.parameters.machine.gap_max
 
     def enable(self) -> tuple[bool, str]:
@@ -140,6 +145,7 @@ class Supervisor:
             self._may_lift_off = True
         elif self._may_lift_off:
             self.regulator.reset()
+            self._platen_watch.reset()
             self.mode = Mode.REGULATING
 
     def _wants_current(self, row: int) -> bool:
@@ -168,6 +174,9 @@ class Supervisor:
             references.velocity[row],
             references.acceleration[row],
         )
+        lost = self._platen_watch.step(self.regulator.position, self.regulator.error)
+        if lost and self.mode == Mode.REGULATING:
+            self._land(lost)
 
     def _land(self, reason: str) -> None:
         references, row = self.references, self._row
