@@ -85,8 +85,14 @@ class Nodes:
         self.folder = folder
         self.started: list[Process] = []
 
-    def start(self, name: str, *arguments: str, params: tuple[str | Path, ...] = ()) -> Process:
-        """Start ``plant``, ``controller``, … with parameters ``name:=value`` and files."""
+    def start(
+        self,
+        name: str,
+        *arguments: str,
+        params: tuple[str | Path, ...] = (),
+        remap: tuple[str, ...] = (),
+    ) -> Process:
+        """Start ``plant``, ``controller``, … with parameters ``name:=value``, files, remappings."""
         package = {'recorder': 'maglev_monitor'}.get(name, f'maglev_{name}')
         command = [executable(package, name), '--ros-args']
         for file in params:
@@ -94,6 +100,8 @@ class Nodes:
             command += ['--params-file', str(path)]
         for argument in arguments:
             command += ['-p', argument]
+        for rule in remap:
+            command += ['-r', rule]
         return self.run(name, command)
 
     def run(self, name: str, command: list[str]) -> Process:
@@ -106,11 +114,17 @@ class Nodes:
 class Observer:
     """A node of the test's own that keeps every message of the sample topics it watches."""
 
-    def __init__(self) -> None:
+    def __init__(self, namespace: str = '', remap: tuple[str, ...] = ()) -> None:
         prepare_middleware()
         self._context = rclpy.Context()
         self._context.init()
-        self.node = PollingNode('observer', context=self._context)
+        rules = [word for rule in remap for word in ('-r', rule)]
+        self.node = PollingNode(
+            'observer',
+            context=self._context,
+            namespace=namespace,
+            cli_args=['--ros-args', *rules],
+        )
         self._executor = EventsExecutor(context=self._context)
         self._executor.add_node(self.node)
         self._subscriptions: dict[str, PolledSubscription] = {}

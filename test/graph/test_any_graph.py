@@ -1,0 +1,164 @@
+"""The loop is at home on any graph: in namespaces, remapped, among strangers. Lockstep.
+
+However it stands there, it flies bit for bit what it flies alone.
+"""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from graph import Nodes, Observer, executable
+from rosgraph_msgs.msg import Clock
+
+from maglev_node.polling import PolledSubscription
+from maglev_node.stamp import nanoseconds
+from maglev_node.topics import CLOCK, DIAGNOSTICS, MEASUREMENT, SAMPLE_TOPICS, TRUE_STATE
+
+SAMPLES = 2000
+STRANGER = Path(__file__).resolve().parents[1] / 'support' / 'stranger.py'
+SCENARIO = 'scenario_ellipse.yaml'
+
+
+@pytest.fixture
+def watching() -> Iterator[list[Observer]]:
+    """Observers, which leave the graph at the end of the test."""
+    observers: list[Observer] = []
+    yield observers
+    for observer in observers:
+        observer.close()
+
+
+def fly(
+    nodes: Nodes, watching: list[Observer], *remap: str, namespace: str = '', plant: str = ''
+) -> Observer:
+    """Start the loop with an observer, for which it waits."""
+    observer = Observer(namespace, remap)
+    watching.append(observer)
+    observer.watch(*SAMPLE_TOPICS)
+    rules = (*remap, f'__ns:={namespace}') if namespace else remap
+    watched = 'watchers:=[observer]'
+    arguments = [plant] if plant else []
+    nodes.start('plant', watched, *arguments, params=('benchmark.yaml',), remap=rules)
+    nodes.start('controller', watched, remap=rules)
+    nodes.start('reference', watched, 'duration:=600.0', params=(SCENARIO,), remap=rules)
+    return observer
+
+
+def flown(observer: Observer) -> np.ndarray:
+    """The true states (SAMPLES, 18) from sample 0 on, with the currents that flow."""
+
+    def done() -> bool:
+        newest = observer.newest(TRUE_STATE)
+        return newest is not None and newest.sequence > SAMPLES + 500
+
+    observer.wait(done, timeout=90)
+    rows = {
+        message.sequence: (*message.state, *message.direct_current, *message.quadrature_current)
+        for message in observer.messages[TRUE_STATE]
+    }
+    states = np.array([rows[number] for number in range(SAMPLES)])
+    assert states[-1, 0] < 0.026  # it flies
+    return states
+
+
+@pytest.fixture(scope='module')
+def alone(tmp_path_factory: pytest.TempPathFactory) -> np.ndarray:
+    """What the loop flies alone."""
+    nodes, watching = Nodes(tmp_path_factory.mktemp('alone')), list[Observer]()
+    try:
+        return flown(fly(nodes, watching))
+    finally:
+        for process in nodes.started:
+            process.kill()
+        watching[0].close()
+
+
+def taken(subscription: PolledSubscription) -> list[int]:
+    """Stamps of what has come on the clock [ns]."""
+    return [nanoseconds(message.clock) for message, _ in subscription.take()]
+
+
+def test_strangers_change_nothing_and_all_tell_stage_time(
+    alone: np.ndarray, nodes: Nodes, watching: list[Observer]
+) -> None:
+    stranger = nodes.run('stranger', [sys.executable, str(STRANGER)])
+    stranger.wait_for('listening')
+    observer = fly(nodes, watching, plant='use_sim_time:=true')
+    clock = observer.node.poll(CLOCK, Clock)
+    diagnostics = observer.node.poll(DIAGNOSTICS, DiagnosticArray)
+    np.testing.assert_array_equal(flown(observer), alone)
+    for topic in (*SAMPLE_TOPICS, CLOCK):
+        stranger.wait_for(f'hears {topic}')
+
+    begin = nanoseconds(observer.messages[MEASUREMENT][0].header.stamp)
+    for topic, messages in observer.messages.items():
+        since = [nanoseconds(message.header.stamp) - begin for message in messages]
+        assert since == [1_000_000 * message.sequence for message in messages], topic
+    assert all(message.lockstep for message in observer.messages[MEASUREMENT])
+    told = taken(clock)
+    steps = np.unique(told)
+    assert steps[0] == begin
+    assert set(np.diff(steps)) == {10_000_000}
+    said = [
+        nanoseconds(message.header.stamp)
+        for message, _ in diagnostics.take()
+        if message.status[0].name == 'plant'
+    ]
+    assert said[-1] in told
+
+
+def test_a_remapped_topic(alone: np.ndarray, nodes: Nodes, watching: list[Observer]) -> None:
+    observer = fly(nodes, watching, 'reference:=/elsewhere/reference')
+    np.testing.assert_array_equal(flown(observer), alone)
+    names = dict(observer.node.get_topic_names_and_types())
+    assert '/elsewhere/reference' in names
+    assert '/reference' not in names
+
+
+def test_two_stages_at_once(alone: np.ndarray, nodes: Nodes, watching: list[Observer]) -> None:
+    both = [fly(nodes, watching, namespace=namespace) for namespace in ('/stage1', '/stage2')]
+    for observer in both:
+        np.testing.assert_array_equal(flown(observer), alone)
+    topics = {name for name, _ in both[0].node.get_topic_names_and_types()}
+    for topic in (*SAMPLE_TOPICS, CLOCK, DIAGNOSTICS):
+        assert {f'/stage1/{topic}', f'/stage2/{topic}'} <= topics
+        assert f'/{topic}' not in topics
+    plant = nodes.started[0]
+    second = nodes.start('plant', remap=('__ns:=/stage1',))
+    assert second.wait() == 1
+    assert "/stage1/stage/measurement is already published by '/stage1/plant'" in second.output
+    plant.signal(signal.SIGINT)
+    assert plant.wait() == 0, plant.output
+
+
+NODES = ('plant', 'hw_bridge', 'controller', 'reference', 'monitor', 'recorder')
+
+
+@pytest.mark.parametrize('name', NODES)
+def test_help(name: str) -> None:
+    package = {'recorder': 'maglev_monitor'}.get(name, f'maglev_{name}')
+    done = subprocess.run(
+        [executable(package, name), '--help'], capture_output=True, text=True, timeout=60
+    )
+    assert (done.returncode, done.stderr) == (0, '')
+    assert f'usage: {name} ' in done.stdout
+    assert 'effective_parameters: string' in done.stdout
+    assert 'diagnostics' in done.stdout
+    if name == 'plant':
+        assert "mode: string, default 'lockstep', one of lockstep, realtime" in done.stdout
+        assert 'answer_timeout: double [s], default 5.0, [0.1, 600] s' in done.stdout
+        assert 'stage/true_state' in done.stdout
+
+
+def test_a_module_is_the_node_itself() -> None:
+    command = [sys.executable, '-m', 'maglev_plant.node', '-h']
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (0, '')
+    assert 'usage: plant ' in done.stdout
