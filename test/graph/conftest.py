@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from graph import Nodes, Observer
 
+from maglev_node.topics import CONTROLLER_STATE, CURRENTS, MEASUREMENT, REFERENCE, TRUE_STATE
+
 
 @pytest.fixture
 def nodes(tmp_path: Path) -> Iterator[Nodes]:
@@ -24,3 +26,10 @@ def observer() -> Iterator[Observer]:
     watching = Observer()
     yield watching
     watching.close()
+
+
+@pytest.fixture
+def watching(observer: Observer) -> Observer:
+    """An observer of all sample topics, part of what the reference waits for."""
+    observer.watch(REFERENCE, MEASUREMENT, TRUE_STATE, CURRENTS, CONTROLLER_STATE)
+    return observer

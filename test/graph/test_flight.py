@@ -7,60 +7,19 @@ import time
 
 import numpy as np
 import pytest
-from graph import Nodes, Observer, Process
+from flight import (
+    LONG,
+    LOWER_STOP,
+    airborne,
+    fly,
+    gap,
+    impact_speed,
+    landed_without_current,
+)
+from graph import Nodes, Observer
 
 from maglev_msgs.msg import ControllerState, Reference
 from maglev_node.topics import CONTROLLER_STATE, CURRENTS, MEASUREMENT, REFERENCE, TRUE_STATE
-
-ELLIPSE = 'scenario_ellipse.yaml'
-LONG = 'duration:=600.0'
-WATCHED = 'watchers:=[observer]'  # by the test
-LOWER_STOP = 0.031
-
-
-def fly(
-    nodes: Nodes, *arguments: str, mode: str = 'lockstep', answer_timeout: float = 5.0
-) -> dict[str, Process]:
-    """Start plant, controller and reference on the ellipse."""
-    patience = f'answer_timeout:={answer_timeout}'
-    return {
-        'plant': nodes.start(
-            'plant', f'mode:={mode}', WATCHED, patience, params=('benchmark.yaml',)
-        ),
-        'controller': nodes.start('controller', f'mode:={mode}', WATCHED),
-        'reference': nodes.start(
-            'reference', f'mode:={mode}', WATCHED, 'run_in:=1.0', *arguments, params=(ELLIPSE,)
-        ),
-    }
-
-
-def gap(observer: Observer) -> float:
-    """The true air gap now [m]."""
-    newest = observer.newest(TRUE_STATE)
-    return LOWER_STOP if newest is None else float(newest.state[0])
-
-
-def airborne(observer: Observer) -> bool:
-    """Whether the platen is well off its stop."""
-    return gap(observer) < 0.026
-
-
-def impact_speed(observer: Observer) -> float:
-    """Greatest speed at which the platen came near one of its vertical stops [m/s]."""
-    states = np.array([message.state for message in observer.look()[TRUE_STATE]])
-    near = (states[:, 0] > LOWER_STOP - 1e-5) | (states[:, 0] < 0.018 + 1e-5)
-    return float(np.max(np.abs(states[near, 1]), initial=0.0))
-
-
-def landed_without_current(observer: Observer) -> bool:
-    """Whether the platen rests and nothing flows or is commanded."""
-    state, currents = observer.newest(TRUE_STATE), observer.newest(CURRENTS)
-    return bool(
-        abs(state.state[0] - LOWER_STOP) < 1e-5
-        and not np.any(currents.direct_current)
-        and not np.any(currents.quadrature_current)
-        and np.max(np.abs(state.direct_current)) < 1e-6
-    )
 
 
 def errors_on_time(observer: Observer, first: int) -> np.ndarray:
@@ -77,13 +36,6 @@ def errors_on_time(observer: Observer, first: int) -> np.ndarray:
     on_time = np.convolve(standstill, np.ones(500))[: len(late)] == 0
     assert np.mean(on_time) > 0.5
     return np.array([message.error[:3] for message in flown])[on_time]
-
-
-@pytest.fixture
-def watching(observer: Observer) -> Observer:
-    """An observer of all sample topics, part of what the reference waits for."""
-    observer.watch(REFERENCE, MEASUREMENT, TRUE_STATE, CURRENTS, CONTROLLER_STATE)
-    return observer
 
 
 def test_lift_off_ellipse_landing(nodes: Nodes, watching: Observer) -> None:
@@ -125,11 +77,17 @@ def test_a_controller_told_to_end_lands_first(nodes: Nodes, watching: Observer) 
 
 
 def test_disabled_it_lands_enabled_it_flies_again(nodes: Nodes, watching: Observer) -> None:
-    fly(nodes, LONG)
+    graph = fly(nodes, LONG)
     watching.wait(lambda: airborne(watching))
     assert watching.call('/controller/enable', False).success
     watching.wait(lambda: landed_without_current(watching))
     assert impact_speed(watching) < 0.05
+    assert 'left the run at sample' in graph['reference'].output
+    watching.wait(lambda: watching.newest(CONTROLLER_STATE).mode == ControllerState.DISABLED)
+    assert watching.call('/controller/enable', True).success
+    assert watching.call('/reference/lift_off').success
+    watching.wait(lambda: airborne(watching))
+    assert watching.newest(CONTROLLER_STATE).mode == ControllerState.REGULATING
 
 
 def test_without_its_controller_the_plant_says_so(nodes: Nodes, watching: Observer) -> None:

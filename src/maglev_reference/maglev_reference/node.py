@@ -169,6 +169,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         except UnreachableError as error:
             self._refuse(str(error))
         else:
+            self._reminded = time.monotonic()
             start = 'starting' if self._run.autostart else 'resting until ~/lift_off'
             self.get_logger().info(f'{start} at sample {self._run.newest}')
 

@@ -1,0 +1,147 @@
+"""One state machine over three nodes: who waits, who gives way, and what it takes to fly again."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+from flight import LONG, LOWER_STOP, airborne, fly, gap, landed_without_current
+from graph import Nodes, Observer
+
+from maglev_msgs.msg import ControllerState, Reference
+from maglev_node.topics import CONTROLLER_STATE, CURRENTS, MEASUREMENT, REFERENCE, TRUE_STATE
+
+
+def samples(observer: Observer, count: int) -> None:
+    """Wait until the stage has taken so many more."""
+    end = observer.newest(MEASUREMENT).sequence + count
+    observer.wait(lambda: observer.newest(MEASUREMENT).sequence > end)
+
+
+def mode(observer: Observer) -> int:
+    """The controller's newest mode."""
+    return int(observer.newest(CONTROLLER_STATE).mode)
+
+
+def phase(observer: Observer) -> int:
+    """The newest phase the reference has published."""
+    return int(observer.newest(REFERENCE).phase)
+
+
+def test_lift_off_is_refused_while_the_controller_is_disabled(
+    nodes: Nodes, watching: Observer
+) -> None:
+    graph = fly(nodes, LONG, controller=('enabled:=false',))
+    watching.wait(lambda: watching.newest(CONTROLLER_STATE) is not None)
+    graph['reference'].wait_for('resting, the controller is disabled: call /controller/enable')
+    answer = watching.call('/reference/lift_off')
+    assert not answer.success
+    assert 'the controller is disabled' in answer.message
+    assert 'call /controller/enable, then /reference/lift_off' in answer.message
+    samples(watching, 30)
+    assert watching.call('/controller/enable', True).success
+    samples(watching, 30)
+    assert mode(watching) == ControllerState.WAITING
+    assert {message.phase for message in watching.look()[REFERENCE]} == {Reference.REST}
+    assert not any(np.any(message.direct_current) for message in watching.look()[CURRENTS])
+    assert gap(watching) == pytest.approx(LOWER_STOP, abs=1e-5)
+    assert watching.call('/reference/lift_off').success
+    watching.wait(lambda: airborne(watching))
+
+
+def test_after_an_emergency_stop_only_a_lift_off_flies(nodes: Nodes, watching: Observer) -> None:
+    graph = fly(nodes, LONG, 'lift_off.time:=6.0')
+    watching.wait(lambda: gap(watching) < LOWER_STOP - 2e-4)
+    assert watching.call('/controller/emergency_stop').success
+    graph['reference'].wait_for('the controller has cut the currents')
+    watching.wait(lambda: phase(watching) == Reference.END)
+    refused = watching.call('/reference/lift_off')
+    assert not refused.success
+    services = '/controller/reset, then /controller/enable, then /reference/lift_off'
+    assert services in refused.message
+    watching.wait(lambda: landed_without_current(watching))
+    assert watching.call('/controller/reset').success
+    assert watching.call('/controller/enable', True).success
+    samples(watching, 30)
+    assert mode(watching) == ControllerState.WAITING
+    assert phase(watching) == Reference.END
+    assert landed_without_current(watching)
+    first = watching.newest(CONTROLLER_STATE).sequence
+    assert watching.call('/reference/lift_off').success
+    watching.wait(lambda: airborne(watching))
+    flown = [m for m in watching.look()[CONTROLLER_STATE] if m.sequence > first]
+    assert max(abs(m.error[0]) for m in flown if m.mode == ControllerState.REGULATING) < 2e-4
+
+
+def test_off_the_lower_stop_a_lift_off_is_refused(nodes: Nodes, watching: Observer) -> None:
+    fly(nodes, LONG)
+    watching.wait(lambda: airborne(watching))
+    assert watching.call('/controller/emergency_stop').success
+    watching.wait(lambda: gap(watching) < 0.0181)  # the magnets pull it up
+    assert watching.call('/controller/reset').success
+    assert watching.call('/controller/enable', True).success
+    samples(watching, 300)
+    answer = watching.call('/reference/lift_off')
+    assert not answer.success
+    assert 'not on its lower stop' in answer.message
+    samples(watching, 30)
+    assert phase(watching) == Reference.END
+
+
+@pytest.mark.parametrize('name', ['controller', 'reference'])
+@pytest.mark.parametrize('stage', ['lockstep', 'realtime'])
+def test_mixed_modes_are_refused(nodes: Nodes, name: str, stage: str) -> None:
+    nodes.start('plant', f'mode:={stage}')
+    ours = {'lockstep': 'realtime', 'realtime': 'lockstep'}[stage]
+    other = nodes.start(name, f'mode:={ours}')
+    assert other.wait() == 1
+    assert f"the stage runs in mode '{stage}', this node in mode '{ours}'" in other.output
+
+
+def test_nothing_hurries_after_the_end(nodes: Nodes, watching: Observer) -> None:
+    fly(nodes, 'duration:=0.5')
+    watching.wait(lambda: watching.newest(REFERENCE) is not None)
+    watching.wait(lambda: phase(watching) == Reference.END)
+    samples(watching, 1100)
+    first, begun = watching.newest(MEASUREMENT).sequence, time.monotonic()
+    watching.serve(2.0)
+    rate = (watching.newest(MEASUREMENT).sequence - first) / (time.monotonic() - begun)
+    assert 5.0 < rate < 80.0
+    assert watching.call('/reference/lift_off').success
+    watching.wait(lambda: airborne(watching), timeout=10.0)
+
+
+def test_nothing_hurries_when_the_reference_is_gone(nodes: Nodes, watching: Observer) -> None:
+    graph = fly(nodes, 'duration:=0.5', 'exit_at_end:=true')
+    watching.wait(lambda: not graph['reference'].running, timeout=60.0)
+    assert graph['reference'].wait() == 0
+    samples(watching, 10)
+    first, begun = watching.newest(MEASUREMENT).sequence, time.monotonic()
+    watching.serve(2.0)
+    rate = (watching.newest(MEASUREMENT).sequence - first) / (time.monotonic() - begun)
+    assert 5.0 < rate < 80.0
+
+
+def test_a_flight_that_has_lost_its_platen_ends(nodes: Nodes, watching: Observer) -> None:
+    burden = 'disturbance.constant:=[5000.0, 0.0, 0.0, 0.0, 0.0]'  # more than all motors carry
+    graph = fly(nodes, LONG, 'exit_at_end:=true', plant=(burden,))
+    watching.wait(lambda: not graph['reference'].running, timeout=60.0)
+    assert graph['reference'].wait() == 1
+    assert 'left the run' in graph['reference'].output
+    assert 'the controller lands by itself' in graph['reference'].output
+    assert 'the platen is lost: for 0.5 s at a stop, y is at' in graph['controller'].output
+    assert gap(watching) == pytest.approx(LOWER_STOP, abs=2e-4)
+    assert not [m for m in watching.look()[REFERENCE] if m.phase == Reference.TRACK]
+
+
+def test_a_controller_that_comes_late_is_waited_for(nodes: Nodes, observer: Observer) -> None:
+    observer.watch(REFERENCE, TRUE_STATE)
+    nodes.start('plant', params=('benchmark.yaml',))
+    reference = nodes.start('reference', LONG, params=('scenario_ellipse.yaml',))
+    reference.wait_for('starting at sample 0')
+    observer.serve(0.5)
+    rest = observer.look()[REFERENCE]
+    assert {message.phase for message in rest} == {Reference.REST}
+    nodes.start('controller')
+    observer.wait(lambda: airborne(observer))

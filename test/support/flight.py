@@ -1,0 +1,63 @@
+"""A flight of real nodes, and how it goes."""
+
+from __future__ import annotations
+
+import numpy as np
+from graph import Nodes, Observer, Process
+
+from maglev_node.topics import CURRENTS, TRUE_STATE
+
+ELLIPSE = 'scenario_ellipse.yaml'
+LONG = 'duration:=600.0'
+WATCHED = 'watchers:=[observer]'  # by the test
+LOWER_STOP = 0.031
+
+
+def fly(
+    nodes: Nodes,
+    *arguments: str,
+    mode: str = 'lockstep',
+    answer_timeout: float = 5.0,
+    plant: tuple[str, ...] = (),
+    controller: tuple[str, ...] = (),
+) -> dict[str, Process]:
+    """Start plant, controller and reference on the ellipse; ``arguments`` are the reference's."""
+    patience = f'answer_timeout:={answer_timeout}'
+    return {
+        'plant': nodes.start(
+            'plant', f'mode:={mode}', WATCHED, patience, *plant, params=('benchmark.yaml',)
+        ),
+        'controller': nodes.start('controller', f'mode:={mode}', WATCHED, *controller),
+        'reference': nodes.start(
+            'reference', f'mode:={mode}', WATCHED, 'run_in:=1.0', *arguments, params=(ELLIPSE,)
+        ),
+    }
+
+
+def gap(observer: Observer) -> float:
+    """The true air gap now [m]."""
+    newest = observer.newest(TRUE_STATE)
+    return LOWER_STOP if newest is None else float(newest.state[0])
+
+
+def airborne(observer: Observer) -> bool:
+    """Whether the platen is well off its stop."""
+    return gap(observer) < 0.026
+
+
+def impact_speed(observer: Observer) -> float:
+    """Greatest speed at which the platen came near one of its vertical stops [m/s]."""
+    states = np.array([message.state for message in observer.look()[TRUE_STATE]])
+    near = (states[:, 0] > LOWER_STOP - 1e-5) | (states[:, 0] < 0.018 + 1e-5)
+    return float(np.max(np.abs(states[near, 1]), initial=0.0))
+
+
+def landed_without_current(observer: Observer) -> bool:
+    """Whether the platen rests and nothing flows or is commanded."""
+    state, currents = observer.newest(TRUE_STATE), observer.newest(CURRENTS)
+    return bool(
+        abs(state.state[0] - LOWER_STOP) < 1e-5
+        and not np.any(currents.direct_current)
+        and not np.any(currents.quadrature_current)
+        and np.max(np.abs(state.direct_current)) < 1e-6
+    )
