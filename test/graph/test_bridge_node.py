@@ -178,7 +178,7 @@ def test_bad_parameters_are_one_clear_line(arguments: list[str], text: str, node
 def fly(nodes: Nodes, observer: Observer, mode: str = 'lockstep') -> dict[str, Process]:
     """Bridge, controller and reference on the ellipse, until it is airborne."""
     observer.watch(MEASUREMENT, REFERENCE, CURRENTS, CONTROLLER_STATE, TRUE_STATE)
-    common = f'mode:={mode}', 'watchers:=1'  # by the test
+    common = f'mode:={mode}', 'watchers:=[observer]'  # by the test
     graph = {
         'stage': nodes.start(
             'hw_bridge', *common, 'answer_timeout:=1.0', params=FILES['hw_bridge']

@@ -14,7 +14,7 @@ from maglev_node.topics import CONTROLLER_STATE, CURRENTS, MEASUREMENT, REFERENC
 
 ELLIPSE = 'scenario_ellipse.yaml'
 LONG = 'duration:=600.0'
-WATCHED = 'watchers:=1'  # by the test
+WATCHED = 'watchers:=[observer]'  # by the test
 LOWER_STOP = 0.031
 
 

@@ -43,7 +43,7 @@ class Feeder:
         self._node = node
         self._messages = messages
         self._publishers = {
-            key: node.create_publisher(SAMPLE_TOPICS[topic], topic, sample_qos(4096))
+            key: node.create_publisher(SAMPLE_TOPICS[topic[1:]], topic, sample_qos(4096))
             for key, (topic, _) in TOPICS.items()
         }
 
@@ -127,7 +127,7 @@ def test_bag_and_live_run_give_the_same_figures(
     assert metrics(nodes)['scenario'] == 'made_up'
     assert metrics(nodes)['missing_samples'] == 0
     with Reader(bag) as reader:
-        sampled: list[Any] = [c.ext for c in reader.connections if c.topic in SAMPLE_TOPICS]
+        sampled: list[Any] = [c.ext for c in reader.connections if c.topic[1:] in SAMPLE_TOPICS]
         assert all(e.offered_qos_profiles[0].reliability.name == 'RELIABLE' for e in sampled)
 
 

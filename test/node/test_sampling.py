@@ -12,9 +12,9 @@ import pytest
 
 from maglev_model.stage import EncoderSample, Fault, StageError, Truth
 from maglev_msgs.msg import Currents, Measurement, PlantState
-from maglev_node import sampling as module
 from maglev_node.sampling import Sampling
 from maglev_node.stage_parameters import ClockedStageParameters
+from maglev_node.topics import MEASUREMENT, TRUE_STATE
 
 ZERO = np.zeros(4)
 
@@ -91,14 +91,21 @@ class Topic:
     def __init__(self) -> None:
         self.sequences: list[int] = []
         self.newest: Any = None
-        self.listeners = 1
 
     def publish(self, message: Any) -> None:
         self.sequences.append(message.sequence)
         self.newest = message
 
-    def get_subscription_count(self) -> int:
-        return self.listeners
+
+class Inbox:
+    """The queue of currents in real time."""
+
+    def __init__(self) -> None:
+        self.messages: list[Any] = []
+
+    def take(self) -> Iterator[tuple[Any, int]]:
+        waiting, self.messages = self.messages, []
+        return ((message, 0) for message in waiting)
 
 
 class MadeUpNode:
@@ -113,13 +120,25 @@ class MadeUpNode:
         self.failed: list[str] = []
         self.timers: list[Any] = []
         self.fail = self.failed.append
+        self.inbox = Inbox()
+        self.subscribers: dict[str, list[str]] = {}
+
+    def get_namespace(self) -> str:
+        return '/'
+
+    def get_subscriptions_info_by_topic(self, topic: str) -> list[Any]:
+        names = self.subscribers.get(topic, [])
+        return [SimpleNamespace(node_name=name, node_namespace='/') for name in names]
 
     def create_publisher(self, message_type: type, _topic: str, _qos: Any) -> Topic:
         return self.topics.setdefault(message_type, Topic())
 
     def create_subscription(self, _type: type, _topic: str, callback: Any, _qos: Any) -> Any:
         self.answer = callback
-        return SimpleNamespace(get_publisher_count=lambda: 0)
+        return SimpleNamespace(topic_name='/stage/currents', get_publisher_count=lambda: 0)
+
+    def poll(self, _topic: str, _type: type) -> Inbox:
+        return self.inbox
 
     def create_timer(self, period: float, action: Any, clock: Any) -> Any:
         self.tick = action
@@ -138,22 +157,6 @@ class MadeUpNode:
         return self.topics[Measurement].sequences
 
 
-class Inbox:
-    """The queue of currents in real time."""
-
-    messages: list[Any]
-
-    def __init__(self, _node: Any) -> None:
-        Inbox.messages = []
-
-    def subscribe(self, _topic: str, _type: type) -> Inbox:
-        return self
-
-    def take(self) -> Iterator[tuple[Any, int]]:
-        waiting, Inbox.messages = Inbox.messages, []
-        return ((message, 0) for message in waiting)
-
-
 def currents(sequence: int, current: float = 0.0) -> Currents:
     return Currents(sequence=sequence, direct_current=[current] * 4)
 
@@ -165,10 +168,7 @@ def start(stage: MadeUpStage, **parameters: Any) -> tuple[Any, MadeUpNode]:
     return sampling, node
 
 
-def start_realtime(
-    stage: MadeUpStage, monkeypatch: pytest.MonkeyPatch, **parameters: Any
-) -> tuple[Any, MadeUpNode]:
-    monkeypatch.setattr(module, 'Queues', Inbox)
+def start_realtime(stage: MadeUpStage, **parameters: Any) -> tuple[Any, MadeUpNode]:
     return start(stage, mode='realtime', **parameters)
 
 
@@ -187,14 +187,22 @@ def test_lockstep_repeats_the_first_sample_and_waits_for_each_answer() -> None:
 
 
 def test_the_first_answer_waits_for_those_who_watch() -> None:
-    _, node = start(MadeUpStage(truth=True), watchers=2)
+    sampling, node = start(MadeUpStage(truth=True), watchers=('monitor', 'recorder'))
+    everybody = ['stranger', 'monitor', 'recorder', 'stranger']
+
+    def answered_when(measurement: list[str], true_state: list[str]) -> bool:
+        node.subscribers = {MEASUREMENT: measurement, TRUE_STATE: true_state}
+        for pause in (0.0, 0.15):  # the middleware gets the time to match them
+            time.sleep(pause)
+            node.answer(currents(0))
+        return node.measured == [0, 1]
+
     node.tick()
-    node.topics[Measurement].listeners = 4
-    node.answer(currents(0))
-    assert node.measured == [0]
-    node.topics[PlantState].listeners = 2
-    node.answer(currents(0))
-    assert node.measured == [0, 1]
+    assert not answered_when(['stranger'] * 9, ['stranger'] * 9)
+    assert sampling.awaited() == 'monitor, recorder'
+    assert not answered_when(everybody, ['monitor'])
+    assert sampling.awaited() == 'recorder'
+    assert answered_when(everybody, everybody)
 
 
 def test_the_truth_goes_out_beside_the_measurement() -> None:
@@ -279,14 +287,12 @@ def test_a_restartable_one_waits_for_a_reset() -> None:
     assert node.failed == []
 
 
-def test_real_time_takes_the_newest_currents_and_counts_missing_ones(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_real_time_takes_the_newest_currents_and_counts_missing_ones() -> None:
     stage = MadeUpStage(real=True)
-    sampling, node = start_realtime(stage, monkeypatch)
+    sampling, node = start_realtime(stage)
     answers = ([0], [1, 2], [], [], [3, 4, 5], [6])  # to the samples that tick after tick follow
     for newest in answers:
-        Inbox.messages = [currents(number, 0.1 * number) for number in newest]
+        node.inbox.messages = [currents(number, 0.1 * number) for number in newest]
         node.tick()
     assert node.measured == [1, 2, 3, 4, 5, 6]
     assert stage.written == pytest.approx([0.0, 0.2, 0.5, 0.6])
@@ -298,14 +304,14 @@ def test_real_time_takes_the_newest_currents_and_counts_missing_ones(
     assert node.timers[0].timer_period_ns > 0
 
 
-def test_real_time_without_a_controller_nothing_is_late(monkeypatch: pytest.MonkeyPatch) -> None:
-    sampling, node = start_realtime(MadeUpStage(real=True), monkeypatch)
+def test_real_time_without_a_controller_nothing_is_late() -> None:
+    sampling, node = start_realtime(MadeUpStage(real=True))
     for _ in range(50):
         node.tick()
-    Inbox.messages = [currents(3)]  # it catches up with what it missed at its start
+    node.inbox.messages = [currents(3)]  # it catches up with what it missed at its start
     node.tick()
     assert (sampling.answered, sampling.late_samples) == (False, 0)
-    Inbox.messages = [currents(50)]
+    node.inbox.messages = [currents(50)]
     node.tick()
     assert sampling.answered
 
@@ -314,7 +320,7 @@ def test_a_stage_without_a_clock_gives_up_when_it_is_too_late(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     stage = MadeUpStage()
-    sampling, node = start_realtime(stage, monkeypatch, overrun_limit=0.5)
+    sampling, node = start_realtime(stage, overrun_limit=0.5)
     begun = time.monotonic()
     monkeypatch.setattr(sampling._pace, '_clock', lambda: begun + 0.3)
     for _ in range(4):

@@ -20,7 +20,7 @@ from rclpy.task import Future
 from std_srvs.srv import SetBool, Trigger
 
 from maglev_node.dds import prepare_middleware
-from maglev_node.polling import PolledSubscription, Queues
+from maglev_node.polling import PolledSubscription, PollingNode
 from maglev_node.topics import SAMPLE_TOPICS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -110,10 +110,9 @@ class Observer:
         prepare_middleware()
         self._context = rclpy.Context()
         self._context.init()
-        self.node = rclpy.create_node('observer', context=self._context)
+        self.node = PollingNode('observer', context=self._context)
         self._executor = EventsExecutor(context=self._context)
         self._executor.add_node(self.node)
-        self._queues = Queues(self.node)
         self._subscriptions: dict[str, PolledSubscription] = {}
         self.messages: dict[str, list[Any]] = {}
 
@@ -121,7 +120,7 @@ class Observer:
         """Keep the messages of these topics from now on."""
         for topic in topics:
             self.messages[topic] = []
-            self._subscriptions[topic] = self._queues.subscribe(topic, SAMPLE_TOPICS[topic])
+            self._subscriptions[topic] = self.node.poll(topic, SAMPLE_TOPICS[topic])
 
     def look(self) -> dict[str, list[Any]]:
         """All messages so far, by topic."""
@@ -182,7 +181,6 @@ class Observer:
 
     def close(self) -> None:
         """Leave the graph."""
-        self._queues.destroy()
         self._executor.shutdown()
         self.node.destroy_node()
         self._context.try_shutdown()

@@ -15,12 +15,18 @@ from maglev_controller.supervision import Mode, Supervisor
 from maglev_model.parameters import build, parameter, specs, values
 from maglev_model.phases import Phase
 from maglev_msgs.msg import ControllerState, Currents, Measurement, Reference
-from maglev_node.graph_guard import GraphGuard
+from maglev_node.graph_guard import GraphGuard, Watchers
 from maglev_node.node import MaglevNode, SourceParameters
-from maglev_node.polling import Queues
 from maglev_node.process import main as run_main
 from maglev_node.stamp import copy_stamp, stamp_now
-from maglev_node.topics import CONTROLLER_STATE, CURRENTS, MEASUREMENT, REFERENCE, sample_qos
+from maglev_node.topics import (
+    CONTROLLER_STATE,
+    CURRENTS,
+    MEASUREMENT,
+    REFERENCE,
+    reference_qos,
+    sample_qos,
+)
 
 _REFERENCE_PERIOD = 2e-3  # between two looks at what references have arrived [s]
 _HAND_PERIOD = 2e-4  # between two looks at the queues during a redesign [s]
@@ -74,8 +80,8 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         self._state_publisher = self.create_publisher(
             ControllerState, CONTROLLER_STATE, sample_qos()
         )
-        self._queues = Queues(self)
-        self._references = self._queues.subscribe(REFERENCE, Reference)
+        self._watchers = Watchers(self, self.parameters.watchers)
+        self._references = self.poll(REFERENCE, Reference, reference_qos())
         self._measurements = self.create_subscription(
             Measurement, MEASUREMENT, self._on_measurement, sample_qos()
         )
@@ -88,7 +94,8 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         for line in self.supervisor.regulator.describe_loops():
             self.get_logger().info(line)
         # The first line a process logs takes 20 ms, so it must not be one that is logged in flight.
-        self.get_logger().info(f'{self.parameters.mode}, waiting for {MEASUREMENT}')
+        where = self._measurements.topic_name
+        self.get_logger().info(f'{self.parameters.mode}, waiting for {where}')
 
     def _take_references(self) -> None:
         """Take what has arrived ahead of time, in bursts: being woken for each slows the loop."""
@@ -110,7 +117,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
 
     def _on_measurement(self, message: Measurement) -> None:
         sequence = message.sequence
-        if self._sequence < 0 and not self._watched():
+        if self._sequence < 0 and not self._watchers.there(CURRENTS, CONTROLLER_STATE):
             return
         if sequence == self._sequence:  # repeated: the answer was not heard
             self._currents_publisher.publish(self._currents)
@@ -133,15 +140,6 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
                 self._pending, self._pending_since = message, time.monotonic()
             return
         self._answer(message)
-
-    def _watched(self) -> bool:
-        """Whether the stage, and all who shall see every sample, are there."""
-        watchers = self.parameters.watchers
-        stage_and_reference = 2 if watchers and not self._lockstep else 1
-        return bool(
-            self._currents_publisher.get_subscription_count() >= watchers + stage_and_reference
-            and self._state_publisher.get_subscription_count() >= watchers
-        )
 
     def _awaits_reference(self, sequence: int) -> bool:
         supervisor = self.supervisor
@@ -273,7 +271,6 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         self.supervisor.cut('shut down')
         if self._sequence >= 0:
             self._publish_currents(self._sequence)
-        self._queues.destroy()
 
 
 def main() -> None:

@@ -1,9 +1,13 @@
-"""One node of a kind on the graph: others are looked for, and the later one leaves."""
+"""Who is on the graph: one node of a kind, of which the later leaves; and who shall watch."""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 from typing import Any
+
+from rclpy.node import Node
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from maglev_node.node import MaglevNode, NodeError
 
@@ -14,6 +18,8 @@ _PROBATION = 5.0
 """How long it goes on looking afterwards, and is the one to leave [s]."""
 
 _LOOK_PERIOD = 0.25  # [s]
+_MATCHING = 0.1  # at most, from when the graph shows a subscription to when it gets messages [s]
+_REMINDER = 5.0  # between two lines about who is waited for [s]
 
 
 class GraphGuard:
@@ -37,7 +43,7 @@ class GraphGuard:
             time.sleep(0.02)
         publishers = self._node.get_publishers_info_by_topic(topic)
         if publishers:
-            raise NodeError(self._taken(topic, kind, publishers[0].node_name))
+            raise NodeError(self._taken(topic, kind, publishers[0]))
         first_claim = not self._topic
         self._topic, self._kind = topic, kind
         if first_claim:
@@ -49,7 +55,7 @@ class GraphGuard:
         """Whether what was claimed still has one publisher; otherwise the node ends."""
         publishers = self._node.get_publishers_info_by_topic(self._topic)
         if len(publishers) > 1:
-            self._node.fail(self._taken(self._topic, self._kind, publishers[0].node_name))
+            self._node.fail(self._taken(self._topic, self._kind, publishers[0]))
         return len(publishers) <= 1
 
     def on_probation(self) -> bool:
@@ -65,9 +71,55 @@ class GraphGuard:
         if not self.on_probation():
             self._timer.cancel()
 
-    @staticmethod
-    def _taken(topic: str, kind: str, who: str) -> str:
+    def _taken(self, topic: str, kind: str, who: TopicEndpointInfo) -> str:
+        name = f'{who.node_namespace.rstrip("/")}/{who.node_name}'
         return (
-            f"{topic} is already published by '{who}': there is another {kind} on this graph;"
-            ' stop it, or use another ROS_DOMAIN_ID'
+            f"{self._node.resolve_topic_name(topic)} is already published by '{name}': there is"
+            f' another {kind} on this graph; stop it, or use another namespace or ROS_DOMAIN_ID'
         )
+
+
+class Watchers:
+    """Nodes, by name and in the namespace of ``node``, that shall see all that it publishes.
+
+    Whoever else subscribes counts for nothing.
+    """
+
+    def __init__(self, node: Node, names: Iterable[str]) -> None:
+        self._node, self._names = node, tuple(names)
+        self._since: dict[tuple[str, str], float] = {}  # that a name subscribes to a topic [s]
+        self._reminded = time.monotonic()
+
+    def missing(self, *topics: str) -> list[str]:
+        """Those that do not yet get what is published on all of these topics."""
+        ready = set(self._names)
+        if self._names:
+            for topic in topics:
+                ready &= self._ready(topic)
+        return [name for name in self._names if name not in ready]
+
+    def there(self, *topics: str) -> bool:
+        """Whether none is missing; now and then says who is."""
+        missing = self.missing(*topics)
+        if missing and time.monotonic() - self._reminded > _REMINDER:
+            self._reminded = time.monotonic()
+            names = ', '.join(missing)
+            where = ' and '.join(self._node.resolve_topic_name(topic) for topic in topics)
+            self._node.get_logger().info(f'waiting for {names} to subscribe to {where}')
+        return not missing
+
+    def _ready(self, topic: str) -> set[str]:
+        here, now = self._node.get_namespace(), time.monotonic()
+        subscribed = {
+            reader.node_name
+            for reader in self._node.get_subscriptions_info_by_topic(topic)
+            if reader.node_namespace == here
+        }
+        for name in self._names:
+            if name in subscribed:
+                self._since.setdefault((name, topic), now)
+            else:
+                self._since.pop((name, topic), None)
+        return {
+            name for name in subscribed if now - self._since.get((name, topic), now) > _MATCHING
+        }

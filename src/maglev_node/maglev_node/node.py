@@ -13,13 +13,13 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.experimental.events_executor import EventsExecutor
-from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.task import Future
 
 from maglev_model import parameters as table
 from maglev_model.parameters import ParameterError, parameter
 from maglev_node import ros_parameters
+from maglev_node.polling import PollingNode
 from maglev_node.topics import DIAGNOSTICS
 
 _SPIN_BOUND = 0.1
@@ -58,11 +58,9 @@ class SourceParameters(NodeParameters):
         description='realtime: SCHED_FIFO priority of the process, where permitted; 0: none',
         read_only=True,
     )
-    watchers: int = parameter(
-        0,
-        lower=0,
-        upper=100,
-        description='nodes that watch every sample (monitor, recorder), waited for at the start',
+    watchers: tuple[str, ...] = parameter(
+        (),
+        description='names of nodes in this namespace that watch every sample, waited for at start',
         read_only=True,
     )
 
@@ -70,8 +68,8 @@ class SourceParameters(NodeParameters):
 P = TypeVar('P', bound=NodeParameters)
 
 
-class MaglevNode(Node, Generic[P]):
-    """A node with a parameter table, ``/diagnostics`` at 1 Hz and an orderly end.
+class MaglevNode(PollingNode, Generic[P]):
+    """A node with a parameter table, ``diagnostics`` at 1 Hz and an orderly end.
 
     A subclass ends the process by :meth:`finish`; what it must do last (no current, a closed bag)
     it does in :meth:`close`, which runs however the process ends, publishers still working.

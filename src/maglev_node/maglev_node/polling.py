@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from rclpy.node import Node
+from rclpy.qos import QoSProfile
 
 from maglev_node.topics import sample_qos
 
@@ -13,44 +14,39 @@ POLL_PERIOD = 0.02
 """How often those who only watch look at their queues [s]."""
 
 
-class Queues:
-    """Queues of a node's topics, filled by the middleware and emptied when the node likes.
+class PollingNode(Node):
+    """A node with queues that the middleware fills and the node empties when it likes.
 
     Waking a Python process for each of several thousand messages a second would cost the two cores
-    more than the control loop does; taking them in bursts costs a fraction. The subscriptions sit
-    on a hidden companion node that no executor serves.
+    more than the control loop does; taking them in bursts costs a fraction.
     """
 
-    def __init__(self, node: Node) -> None:
-        self._companion = Node(
-            f'_{node.get_name()}_queues',
-            context=node.context,
-            use_global_arguments=False,
-            enable_rosout=False,
-            start_parameter_services=False,
-        )
+    @property
+    def subscriptions(self) -> Iterator[Any]:
+        """Those that an executor dispatches: all but the polled ones."""
+        return (each for each in super().subscriptions if each.callback is not _never_called)
 
-    def subscribe(
-        self, topic: str, message_type: type, *, depth: int = 16384, raw: bool = False
+    def poll(
+        self, topic: str, message_type: type, qos: QoSProfile | None = None, *, raw: bool = False
     ) -> PolledSubscription:
-        """A queue of ``depth`` messages; ``raw`` gives them serialised, as bytes.
+        """A queue of messages, by default for samples; ``raw`` gives them serialised, as bytes.
 
-        ``depth`` must cover what arrives between two polls; with depth 1 it holds the newest.
+        The depth of ``qos`` must cover what arrives between two polls; with depth 1 the queue
+        holds the newest.
         """
-        subscription = self._companion.create_subscription(
-            message_type, topic, _never_called, sample_qos(depth), raw=raw
+        return PolledSubscription(
+            self,
+            self.create_subscription(
+                message_type, topic, _never_called, qos or sample_qos(), raw=raw
+            ),
         )
-        return PolledSubscription(subscription)
-
-    def destroy(self) -> None:
-        """Give the queues up."""
-        self._companion.destroy_node()
 
 
 class PolledSubscription:
     """One topic whose messages wait until they are taken."""
 
-    def __init__(self, subscription: Any) -> None:
+    def __init__(self, node: Node, subscription: Any) -> None:
+        self._node = node
         self._subscription = subscription
         self.topic: str = subscription.topic_name
 
@@ -67,6 +63,10 @@ class PolledSubscription:
     def publisher_count(self) -> int:
         """How many publishers the topic has."""
         return int(self._subscription.get_publisher_count())
+
+    def destroy(self) -> None:
+        """Give the queue up."""
+        self._node.destroy_subscription(self._subscription)
 
 
 def _never_called(_message: Any) -> None:

@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from rclpy.node import Node
+from typing import Any, TypeVar
 
 from maglev_model.stage import EncoderSample, Truth
 from maglev_msgs.msg import Measurement, PlantState
+from maglev_node.graph_guard import Watchers
+from maglev_node.node import MaglevNode, SourceParameters
 from maglev_node.stamp import copy_stamp, stamp_now
 from maglev_node.topics import MEASUREMENT, TRUE_STATE, sample_qos
+
+P = TypeVar('P', bound=SourceParameters)
 
 
 class SamplePublisher:
     """The measurement of each sample and, with ``truth``, the true state it was taken from."""
 
-    def __init__(self, node: Node, *, truth: bool) -> None:
+    def __init__(self, node: MaglevNode[P], *, truth: bool) -> None:
         self._node = node
         self._measurement, self._true_state = Measurement(), PlantState()
         self._measurement.header.frame_id = self._true_state.header.frame_id = 'stage'
         self._publisher: Any = node.create_publisher(Measurement, MEASUREMENT, sample_qos())
         self._true_publisher: Any = None
+        self._topics = [MEASUREMENT]
+        self._watchers = Watchers(node, node.parameters.watchers)
         if truth:
+            self._topics.append(TRUE_STATE)
             self._true_publisher = node.create_publisher(PlantState, TRUE_STATE, sample_qos())
 
     def publish(
@@ -42,13 +47,13 @@ class SamplePublisher:
             state.thermal_load = truth.thermal_load
             self._true_publisher.publish(state)
 
-    def watched(self, watchers: int) -> bool:
-        """Whether all who shall see every sample are there: watchers, controller, reference."""
-        listeners = watchers + 2 if watchers else 1
-        if self._publisher.get_subscription_count() < listeners:
-            return False
-        truth = self._true_publisher
-        return truth is None or bool(truth.get_subscription_count() >= watchers)
+    def watched(self) -> bool:
+        """Whether all who shall see every sample are there; now and then says who is not."""
+        return self._watchers.there(*self._topics)
+
+    def missing(self) -> list[str]:
+        """Names of those who shall see every sample and are not there."""
+        return self._watchers.missing(*self._topics)
 
     def destroy(self) -> None:
         """Leave the graph."""

@@ -12,7 +12,7 @@ from maglev_model.stage import EncoderSample, Fault, Stage, StageError
 from maglev_msgs.msg import Currents
 from maglev_node.managed_node import ManagedNode
 from maglev_node.pacing import Deadlines, Pace, StageClock
-from maglev_node.polling import PolledSubscription, Queues
+from maglev_node.polling import PolledSubscription
 from maglev_node.sample_publisher import SamplePublisher
 from maglev_node.stage_parameters import ClockedStageParameters, StageNodeParameters
 from maglev_node.topics import CURRENTS, sample_qos
@@ -50,7 +50,6 @@ class Sampling(Generic[P, S]):
         self._newest = self._applied = -1  # sequence of the currents that came, were followed last
         self._publisher = SamplePublisher(node, truth=stage.truth() is not None)
         self._answers: Any = None
-        self._queues: Queues | None = None
         self._pace: Pace = StageClock(stage.sample_time)
         if not stage.paced:
             self._pace = Deadlines(stage.sample_time)
@@ -59,8 +58,7 @@ class Sampling(Generic[P, S]):
                 Currents, CURRENTS, self._on_answer, sample_qos()
             )
         else:
-            self._queues = Queues(node)
-            self._currents: PolledSubscription = self._queues.subscribe(CURRENTS, Currents)
+            self._currents: PolledSubscription = node.poll(CURRENTS, Currents)
 
     def start(self) -> None:
         """Activate the stage and take the first sample. Raises StageError."""
@@ -83,12 +81,9 @@ class Sampling(Generic[P, S]):
         self.stage.deactivate()
 
     def release(self) -> None:
-        """Give up the stage, with no current flowing, and what the node itself does not."""
+        """Give up the stage, with no current flowing."""
         self._stop_timer()
         self.stage.close()
-        if self._queues is not None:
-            self._queues.destroy()
-            self._queues = None
 
     def close(self) -> None:
         """Release the stage and leave the graph."""
@@ -96,11 +91,17 @@ class Sampling(Generic[P, S]):
         self._publisher.destroy()
         if self._answers is not None:
             self._node.destroy_subscription(self._answers)
+        else:
+            self._currents.destroy()
 
     def land(self, why: str) -> None:
         """Land, publishing every sample, and be done with it."""
         self.stage.land(why)
         self._go_on_alone()
+
+    def awaited(self) -> str:
+        """Who is waited for before the first sample is answered."""
+        return ', '.join(self._publisher.missing()) or 'a controller'
 
     def emergency_stop(self) -> str:
         """Latch a fault; returns what comes of it."""
@@ -130,7 +131,7 @@ class Sampling(Generic[P, S]):
     def _on_answer(self, message: Currents) -> None:
         if message.sequence != self.sequence or self._timer is None:
             return
-        if not (self.answered or self._publisher.watched(self._node.parameters.watchers)):
+        if not (self.answered or self._publisher.watched()):
             return
         self.answered = True
         self._apply(message.direct_current, message.quadrature_current)
@@ -146,7 +147,7 @@ class Sampling(Generic[P, S]):
             who = (
                 'the controller, or the reference it waits for, has stopped'
                 if self._answers.get_publisher_count()
-                else f'no controller publishes {CURRENTS} any more'
+                else f'no controller publishes {self._answers.topic_name} any more'
             )
             self._unanswered(f'no currents for sample {self.sequence} within {waited:.1f} s: {who}')
 

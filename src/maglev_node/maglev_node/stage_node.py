@@ -89,7 +89,8 @@ class StageNode(ManagedNode[P], Generic[P, S]):
 
     def activate(self) -> None:
         """Take the first sample and begin to sample."""
-        self.get_logger().info(f'{self.parameters.mode}, waiting for a controller on {CURRENTS}')
+        where = self.resolve_topic_name(CURRENTS)
+        self.get_logger().info(f'{self.parameters.mode}, waiting for a controller on {where}')
         self.take_realtime_priority()
         self.sampling.start()
 
@@ -147,7 +148,7 @@ class StageNode(ManagedNode[P], Generic[P, S]):
         if self.state != 'active':
             return DiagnosticStatus.OK, self.state, facts
         if not sampling.answered:
-            return DiagnosticStatus.WARN, 'waiting for a controller', facts
+            return DiagnosticStatus.WARN, f'waiting for {sampling.awaited()}', facts
         if not sampling.armed:
             return (
                 DiagnosticStatus.WARN,

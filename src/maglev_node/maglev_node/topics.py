@@ -1,4 +1,7 @@
-"""Topic names, message types and quality of service: what the nodes agree on."""
+"""Topic names, message types and quality of service: what the nodes agree on.
+
+The names are relative: a node's namespace and remappings say where they are on the graph.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +9,13 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 
 from maglev_msgs.msg import ControllerState, Currents, Measurement, PlantState, Reference
 
-MEASUREMENT = '/stage/measurement'
-CURRENTS = '/stage/currents'
-REFERENCE = '/reference'
-CONTROLLER_STATE = '/controller/state'
-TRUE_STATE = '/stage/true_state'
-DIAGNOSTICS = '/diagnostics'
+MEASUREMENT = 'stage/measurement'
+CURRENTS = 'stage/currents'
+REFERENCE = 'reference'
+CONTROLLER_STATE = 'controller/state'
+TRUE_STATE = 'stage/true_state'
+DIAGNOSTICS = 'diagnostics'
+CLOCK = 'clock'
 
 SAMPLE_TOPICS: dict[str, type] = {
     MEASUREMENT: Measurement,
@@ -33,4 +37,14 @@ def sample_qos(depth: int = 16384) -> QoSProfile:
         depth=depth,
         reliability=ReliabilityPolicy.RELIABLE,
         durability=DurabilityPolicy.VOLATILE,
+    )
+
+
+def reference_qos(depth: int = 1024) -> QoSProfile:
+    """Of the reference: the last ``depth`` samples are kept for a controller that joins late."""
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=depth,
+        reliability=ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL,
     )

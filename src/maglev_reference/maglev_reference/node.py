@@ -15,12 +15,11 @@ from maglev_model.parameters import parameter
 from maglev_model.phases import Phase
 from maglev_model.platen import outputs_of_gaps
 from maglev_msgs.msg import Currents, Measurement, Reference
-from maglev_node.graph_guard import GraphGuard
+from maglev_node.graph_guard import GraphGuard, Watchers
 from maglev_node.node import MaglevNode, SourceParameters
-from maglev_node.polling import Queues
 from maglev_node.process import main as run_main
 from maglev_node.stamp import stamp_now
-from maglev_node.topics import CURRENTS, MEASUREMENT, REFERENCE, sample_qos
+from maglev_node.topics import CURRENTS, MEASUREMENT, REFERENCE, reference_qos, sample_qos
 from maglev_reference.accuracy import summary, warnings
 from maglev_reference.check import UnreachableError
 from maglev_reference.parameters import ReferenceParameters
@@ -67,7 +66,7 @@ class ReferenceNodeParameters(SourceParameters, ReferenceParameters):
 
 
 class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
-    """Publishes ``/reference`` up to ``lead`` samples ahead of the newest measurement.
+    """Publishes ``reference`` up to ``lead`` samples ahead of the newest measurement.
 
     It looks at the newest measurement on a short timer instead of being woken by each one. The
     first measurement seen once all subscribers are there tells where the platen rests and becomes
@@ -84,17 +83,16 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         self._graph = GraphGuard(self)
         self._graph.claim(REFERENCE, 'reference')
         self._run = ReferenceRun(self.parameters, self.parameters.lead, self.parameters.autostart)
-        self._expected = self.parameters.watchers + 1  # and the controller
+        self._watchers = Watchers(self, self.parameters.watchers)
         self._seen = self._reminded = time.monotonic()
         self._message = Reference()
         self._message.header.frame_id = 'stage'
-        self._publisher = self.create_publisher(Reference, REFERENCE, sample_qos())
-        self._queues = Queues(self)
-        self._measurements = self._queues.subscribe(MEASUREMENT, Measurement, depth=1)
+        self._publisher = self.create_publisher(Reference, REFERENCE, reference_qos())
+        self._measurements = self.poll(MEASUREMENT, Measurement, sample_qos(1))
         # In real time nobody waits for the controller but us; in lockstep it waits for us.
         self._answers = None
         if self.parameters.mode == 'realtime':
-            self._answers = self._queues.subscribe(CURRENTS, Currents, depth=1)
+            self._answers = self.poll(CURRENTS, Currents, sample_qos(1))
         self.create_service(Trigger, '~/lift_off', self._lift_off)
         self.create_service(Trigger, '~/land', self._land)
         self.create_timer(self.parameters.poll_period, self._poll, clock=self.steady_clock)
@@ -115,22 +113,20 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
 
     def _wait(self, measurement: Measurement | None) -> None:
         answered = self._answers is None or any(self._answers.take(1))
-        if measurement is not None and answered and self._listeners() >= self._expected:
+        if measurement is not None and answered and not self._watchers.missing(REFERENCE):
             self._start(measurement)
         elif time.monotonic() - self._reminded > _REMINDER:
             self._reminded = time.monotonic()
             self.get_logger().info(self._waiting_for())
 
-    def _listeners(self) -> int:
-        return int(self._publisher.get_subscription_count())
-
     def _waiting_for(self) -> str:
-        there = self._listeners()
-        if there < self._expected:
-            return f'waiting for {self._expected} subscribers of {REFERENCE}, {there} are there'
+        missing = self._watchers.missing(REFERENCE)
+        if missing:
+            where = self._publisher.topic_name
+            return f'waiting for {", ".join(missing)} to subscribe to {where}'
         if self._measurements.publisher_count() == 0:
-            return f'waiting for a stage on {MEASUREMENT}'
-        return f'waiting for the controller to answer on {CURRENTS}'
+            return f'waiting for a stage on {self._measurements.topic}'
+        return f'waiting for the controller to answer on {self.resolve_topic_name(CURRENTS)}'
 
     def _start(self, measurement: Measurement) -> None:
         if not self._graph.alone():
@@ -213,10 +209,6 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
             'ahead': self._run.ahead,
         }
         return DiagnosticStatus.OK, 'running', facts
-
-    def close(self) -> None:
-        """The queue is given up; the controller lands by itself when the reference ends."""
-        self._queues.destroy()
 
 
 def main() -> None:

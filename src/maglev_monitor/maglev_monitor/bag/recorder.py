@@ -24,7 +24,7 @@ from maglev_model.parameters import parameter
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.writer import BagWriter
 from maglev_node.node import MaglevNode, NodeError, NodeParameters
-from maglev_node.polling import PolledSubscription, Queues
+from maglev_node.polling import PolledSubscription
 from maglev_node.process import main as run_main
 from maglev_node.topics import DIAGNOSTICS, SAMPLE_TOPICS
 
@@ -58,9 +58,8 @@ class RecorderNode(MaglevNode[RecorderParameters]):
             Path(self.parameters.output), message_folder, compress=self.parameters.compress
         )
         self._open()
-        self._queues = Queues(self)
         self._taps: dict[str, PolledSubscription] = {
-            topic: self._queues.subscribe(topic, message_type, raw=True)
+            topic: self.poll(topic, message_type, raw=True)
             for topic, message_type in TOPICS.items()
         }
         self._failed = False
@@ -71,7 +70,6 @@ class RecorderNode(MaglevNode[RecorderParameters]):
     def close(self) -> None:
         """Take what still waits and finish the bag."""
         self._poll()
-        self._queues.destroy()
         try:
             self._writer.close()
         except BagError as error:
@@ -102,9 +100,9 @@ class RecorderNode(MaglevNode[RecorderParameters]):
                 messages = list(tap.take())
                 if not messages:
                     continue
-                if topic not in self._writer.counts:
-                    self._add_topic(topic)
-                self._writer.write(topic, messages)
+                if tap.topic not in self._writer.counts:
+                    self._add_topic(tap.topic, TOPICS[topic])
+                self._writer.write(tap.topic, messages)
             now = time.monotonic()
             if now - self._flushed > self.parameters.flush_period:
                 self._flushed = now
@@ -113,11 +111,11 @@ class RecorderNode(MaglevNode[RecorderParameters]):
             self._failed = True
             self.fail(str(error))
 
-    def _add_topic(self, topic: str) -> None:
+    def _add_topic(self, topic: str, message_type: type) -> None:
         """Add a topic with the QoS of those who publish it."""
         offered = [info.qos_profile for info in self.get_publishers_info_by_topic(topic)]
         unique = list(dict.fromkeys(bag_qos(profile) for profile in offered))
-        self._writer.add_topic(topic, type_name(TOPICS[topic]), unique)
+        self._writer.add_topic(topic, type_name(message_type), unique)
 
 
 def type_name(message_type: type) -> str:

@@ -18,7 +18,7 @@ from maglev_monitor.metrics.run_parameters import FAULT_LEVEL, RUN_KEY, run_to_j
 from maglev_monitor.report.terminal import as_text
 from maglev_node import topics
 from maglev_node.node import MaglevNode, NodeError, NodeParameters
-from maglev_node.polling import PolledSubscription, Queues
+from maglev_node.polling import PolledSubscription
 from maglev_node.process import main as run_main
 from maglev_node.stamp import seconds
 
@@ -52,10 +52,8 @@ class MonitorNode(MaglevNode[MonitorParameters]):
         self._check_output()
         self._watch = RunWatch(self.parameters, time.monotonic())
         self._run_json = run_to_json(self.parameters)
-        self._queues = Queues(self)
         self._taps: dict[str, PolledSubscription] = {
-            topic: self._queues.subscribe(topic, topics.SAMPLE_TOPICS[topic], raw=True)
-            for topic in KEYS
+            topic: self.poll(topic, topics.SAMPLE_TOPICS[topic], raw=True) for topic in KEYS
         }
         self.create_subscription(DiagnosticArray, topics.DIAGNOSTICS, self._on_diagnostics, 100)
         self.create_timer(_POLL_PERIOD, self._poll, clock=self.steady_clock)
@@ -65,7 +63,6 @@ class MonitorNode(MaglevNode[MonitorParameters]):
         """Leave the figures of a run that was broken off."""
         if not self._concluded:
             self._conclude(self._arrived())
-        self._queues.destroy()
 
     def diagnose(self) -> tuple[bytes, str, Mapping[str, object]]:
         """The state of the run, and its parameters for the bag."""
@@ -126,7 +123,8 @@ class MonitorNode(MaglevNode[MonitorParameters]):
         for topic, count in publishers.items():
             if count > 1:
                 self._stop_watching(
-                    f'{count} nodes publish {topic}: stop all but one, or use another ROS_DOMAIN_ID'
+                    f'{count} nodes publish {self._taps[topic].topic}: stop all but one,'
+                    ' or use another ROS_DOMAIN_ID'
                 )
                 return
         reason = self._watch.given_up({KEYS[topic]: n for topic, n in publishers.items()}, now)
