@@ -63,7 +63,7 @@ class Flight(NamedTuple):
             output = f'output:={self.out}/metrics.json'
             scenario = f'scenario:={self.scenario.name}'
             return ['exit_at_end:=true', output, scenario, f'stage:={self.stage}', mode]
-        values = [mode, 'watchers:=2']
+        values = [mode, "watchers:=['monitor','recorder']"]
         if node == 'reference':
             values += ['autostart:=true', 'exit_at_end:=false']
             if self.mode == 'realtime':

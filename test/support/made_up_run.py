@@ -114,8 +114,8 @@ def make_run(n: int = 1200, seed: int = 1) -> Run:
 class Encoder:
     """Serializes a run's messages with rosbags; ``former`` ones are stamped by the wall clock."""
 
-    def __init__(self, *, former: bool = False) -> None:
-        self._former = former
+    def __init__(self, *, former: bool = False, lockstep: bool = True) -> None:
+        self._former, self._lockstep = former, lockstep
         self.store = get_typestore(Stores.ROS2_JAZZY)
         types: dict[str, Any] = {}
         for file in MESSAGES.glob('*.msg'):
@@ -146,7 +146,7 @@ class Encoder:
                 run.position[n, 1],
                 run.position[n, 2],
                 run.late[n],
-                *(() if self._former else (run.stamp[n], True)),
+                *(() if self._former else (run.stamp[n], self._lockstep)),
             ),
             'currents': (run.direct[n], run.quadrature[n]),
             'controller': (

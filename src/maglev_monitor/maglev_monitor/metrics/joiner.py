@@ -49,9 +49,12 @@ def _row_type() -> np.dtype[np.void]:
 
 
 ROW = _row_type()
-"""One joined sample: ``sequence``; ``stamp`` and ``stage_time`` of the measurement, by wall clock and
-by the stage's [ns], the same in bags from before the stage had one; ``has_<topic>`` and the
-columns of each topic (all zero where the topic has no message for this sample)."""
+"""One joined sample.
+
+``sequence``; ``stamp`` and ``stage_time`` of the measurement, by the wall clock and by the stage's
+[ns], the same in bags from before the stage had one; ``has_<topic>`` and the columns of each topic
+(all zero where the topic has no message for this sample).
+"""
 
 
 _ON_ITS_WAY = 100  # a topic that is further behind than this has stopped [samples]
