@@ -19,7 +19,7 @@ from rosbags.rosbag2 import Reader
 
 from maglev_monitor.bag.analysis import analyse
 from maglev_monitor.bag.reader import Bag
-from maglev_node.stamp import stamp_now
+from maglev_node.stamp import set_stamp
 from maglev_node.topics import SAMPLE_TOPICS, sample_qos
 
 SAMPLES = 1500
@@ -81,7 +81,7 @@ class Feeder:
         while publisher.get_subscription_count() == 0:
             time.sleep(0.02)
         array = DiagnosticArray(status=[DiagnosticStatus(level=level, name=name, message=text)])
-        stamp_now(array.header.stamp)
+        set_stamp(array.header.stamp, time.time_ns())
         publisher.publish(array)
 
 

@@ -121,6 +121,30 @@ def test_files_apply_to_their_node_and_the_later_wins(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ('section', 'applies'),
+    [
+        *((name, True) for name in ('plant', '/plant', '/lab/plant', '/**', '/*/plant', 'lab/*')),
+        ('/**/plant', True),
+        ('/lab/**', True),
+        *((name, False) for name in ('other', '/lab', '/*/*/plant', '/lab/plants', '/lab/pl')),
+    ],
+)
+def test_sections_of_a_node_in_a_namespace(tmp_path: Path, section: str, applies: bool) -> None:
+    path = tmp_path / 'a.yaml'
+    path.write_text(f'{section}: {{ros__parameters: {{magnet: {{height: 1e-2}}}}}}\n')
+    found = parameters.read_yaml(path, 'plant', '/lab/plant')
+    assert found == ({'magnet.height': 0.01} if applies else {})
+
+
+def test_arguments_are_for_all_nodes_or_one() -> None:
+    assert parameters.read_argument('magnet.height:=1e-2', 'plant') == {'magnet.height': 0.01}
+    assert parameters.read_argument('plant:names:=[x, y]', 'plant') == {'names': ['x', 'y']}
+    assert parameters.read_argument('other:pairs:=2', 'plant', '/lab/plant') == {}
+    with pytest.raises(ParameterError, match='pairs'):
+        parameters.read_argument('pairs:=[', 'plant')
+
+
+@pytest.mark.parametrize(
     'text', ['pairs: 3', '- 1', 'plant: {pairs: 3}', 'plant: {ros__parameters: [']
 )
 def test_files_that_are_no_parameter_files(tmp_path: Path, text: str) -> None:

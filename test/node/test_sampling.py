@@ -9,11 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rosgraph_msgs.msg import Clock
 
 from maglev_model.stage import EncoderSample, Fault, StageError, Truth
 from maglev_msgs.msg import Currents, Measurement, PlantState
 from maglev_node.sampling import Sampling
 from maglev_node.stage_parameters import ClockedStageParameters
+from maglev_node.stamp import nanoseconds
 from maglev_node.topics import MEASUREMENT, TRUE_STATE
 
 ZERO = np.zeros(4)
@@ -91,9 +93,14 @@ class Topic:
     def __init__(self) -> None:
         self.sequences: list[int] = []
         self.newest: Any = None
+        self.stamps: list[int] = []
 
     def publish(self, message: Any) -> None:
+        if isinstance(message, Clock):
+            self.stamps.append(nanoseconds(message.clock))
+            return
         self.sequences.append(message.sequence)
+        self.stamps.append(nanoseconds(message.header.stamp))
         self.newest = message
 
 
@@ -203,6 +210,32 @@ def test_the_first_answer_waits_for_those_who_watch() -> None:
     assert not answered_when(everybody, ['monitor'])
     assert sampling.awaited() == 'recorder'
     assert answered_when(everybody, everybody)
+
+
+def test_stamps_are_stage_time_from_the_first_sample_on() -> None:
+    sampling, node = start(MadeUpStage(), first_sequence=7)
+    begin = time.time_ns()
+    node.tick()
+    time.sleep(0.01)
+    for sequence in range(7, 32):
+        node.answer(currents(sequence))
+    sent = node.topics[Measurement]
+    assert begin <= sent.stamps[0] <= time.time_ns() - 10_000_000
+    assert np.diff(sent.stamps).tolist() == [1_000_000] * 25
+    assert sent.newest.lockstep
+    assert sent.newest.wall_time >= begin + 10_000_000
+    assert node.topics[Clock].stamps == sent.stamps[::10]
+    sampling.stop()
+    sampling.start()
+    node.tick()
+    assert sent.stamps[-1] - sent.stamps[-2] != 1_000_000  # begins anew
+
+
+def test_in_real_time_the_stage_is_no_clock() -> None:
+    _, node = start_realtime(MadeUpStage(real=True))
+    node.tick()
+    assert not node.topics[Measurement].newest.lockstep
+    assert Clock not in node.topics
 
 
 def test_the_truth_goes_out_beside_the_measurement() -> None:

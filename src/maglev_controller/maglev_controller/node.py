@@ -18,7 +18,7 @@ from maglev_msgs.msg import ControllerState, Currents, Measurement, Reference
 from maglev_node.graph_guard import GraphGuard, Watchers
 from maglev_node.node import MaglevNode, SourceParameters
 from maglev_node.process import main as run_main
-from maglev_node.stamp import copy_stamp, stamp_now
+from maglev_node.stamp import copy_stamp
 from maglev_node.topics import (
     CONTROLLER_STATE,
     CURRENTS,
@@ -153,6 +153,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
     def _answer(self, message: Measurement) -> None:
         self._pending = None
         self._answered = time.monotonic()
+        copy_stamp(message.header.stamp, self._currents.header.stamp)
         supervisor = self.supervisor
         sequence = self._sequence = message.sequence
         row = supervisor.references.find(sequence)
@@ -166,7 +167,6 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
 
     def _publish_currents(self, sequence: int) -> None:
         message = self._currents
-        stamp_now(message.header.stamp)
         message.sequence = sequence
         message.direct_current = self.supervisor.direct_current
         message.quadrature_current = self.supervisor.quadrature_current

@@ -242,11 +242,12 @@ def _assemble(cls: type[T], checked: Mapping[str, object], prefix: str) -> T:
     return cls(**keywords)
 
 
-def read_yaml(path: str | Path, node: str) -> dict[str, object]:
-    """The overrides a ROS parameter file holds for one node, by full name.
+def read_yaml(path: str | Path, *nodes: str) -> dict[str, object]:
+    """The overrides a ROS parameter file holds for a node that has these names, by full name.
 
-    Sections ``/**`` and ``node`` (with or without a leading slash) apply, in the file's order.
-    Raises :class:`ParameterError` when the file is missing or is no parameter file.
+    Sections of a name (with or without a leading slash) and those whose wildcards (``*`` for a
+    part of a name, ``**`` for any number of them) match one apply, in the file's order. Raises
+    :class:`ParameterError` when the file is missing or is no parameter file.
     """
     try:
         content = yaml.load(Path(path).read_text(encoding='utf-8'), Loader=_Loader) or {}
@@ -262,9 +263,31 @@ def read_yaml(path: str | Path, node: str) -> dict[str, object]:
             raise ParameterError(
                 f"'{path}': section '{section}' must hold 'ros__parameters' and nothing else"
             )
-        if str(section).lstrip('/') in ('**', node):
+        if _applies(str(section), nodes):
             found.update(_flatten(body['ros__parameters'] or {}))
     return found
+
+
+def read_argument(text: str, *nodes: str) -> dict[str, object]:
+    """The override that ``name:=value`` holds, or ``node:name:=value`` when it is for the node.
+
+    Raises :class:`ParameterError` for a value that is no YAML.
+    """
+    names, _, value = text.partition(':=')
+    section, _, name = names.rpartition(':')
+    if section and not _applies(section, nodes):
+        return {}
+    try:
+        return {name: yaml.load(value, Loader=_Loader)}
+    except yaml.YAMLError as error:
+        raise ParameterError(f"'{value}' of parameter '{name}' is no valid YAML") from error
+
+
+def _applies(section: str, nodes: Iterable[str]) -> bool:
+    """Whether a section of a parameter file is for a node that has these names."""
+    pattern = re.escape('/' + section.lstrip('/'))
+    pattern = pattern.replace(r'/\*\*', '(/[^/]+)*').replace(r'\*', '[^/]+')
+    return any(re.fullmatch(pattern, '/' + node.lstrip('/')) for node in nodes)
 
 
 def from_yaml(cls: type[T], node: str, *paths: str | Path) -> T:
@@ -312,10 +335,16 @@ class _Loader(yaml.SafeLoader):
 
 
 class _Dumper(yaml.SafeDumper):
-    """Quotes the strings that ROS, unlike PyYAML, takes for booleans: y and n."""
+    """Quotes the strings that ROS, unlike PyYAML, takes for booleans or numbers: y, n and 1e3."""
 
 
 _Dumper.add_implicit_resolver('tag:yaml.org,2002:bool', re.compile('^[yYnN]$'), list('yYnN'))
+for _each in (_Loader, _Dumper):
+    _each.add_implicit_resolver(
+        'tag:yaml.org,2002:float',
+        re.compile(r'^[-+]?\d+\.?\d*[eE][-+]?\d+$'),
+        list('-+0123456789'),
+    )
 
 
 def _flatten(mapping: Mapping[str, Any], prefix: str = '') -> dict[str, object]:

@@ -120,6 +120,5 @@ class Watchers:
                 self._since.setdefault((name, topic), now)
             else:
                 self._since.pop((name, topic), None)
-        return {
-            name for name in subscribed if now - self._since.get((name, topic), now) > _MATCHING
-        }
+        since = self._since
+        return {name for name in subscribed if now - since.get((name, topic), now) > _MATCHING}

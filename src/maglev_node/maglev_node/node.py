@@ -14,13 +14,15 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.parameter import Parameter
+from rclpy.subscription import Subscription
 from rclpy.task import Future
+from rclpy.time_source import CLOCK_TOPIC
 
 from maglev_model import parameters as table
 from maglev_model.parameters import ParameterError, parameter
 from maglev_node import ros_parameters
 from maglev_node.polling import PollingNode
-from maglev_node.topics import DIAGNOSTICS
+from maglev_node.topics import CLOCK, DIAGNOSTICS
 
 _SPIN_BOUND = 0.1
 """Longest wait inside the executor [s]; signals are seen at least this often."""
@@ -77,7 +79,7 @@ class MaglevNode(PollingNode, Generic[P]):
 
     def __init__(self, name: str, parameter_table: type[P], **node_options: Any) -> None:
         super().__init__(name, automatically_declare_parameters_from_overrides=True, **node_options)
-        self.parameters: P = ros_parameters.declare(self, parameter_table)
+        self.parameters: P = ros_parameters.declare(self, name, parameter_table)
         self.add_on_set_parameters_callback(self._on_set_parameters)
         self.steady_clock = Clock(clock_type=ClockType.STEADY_TIME)
         self._finished: Future = Future()
@@ -87,6 +89,13 @@ class MaglevNode(PollingNode, Generic[P]):
         self.create_timer(1.0, self._publish_diagnostics, clock=self.steady_clock)
         if self.parameters.effective_parameters:
             self._write_effective_parameters(Path(self.parameters.effective_parameters))
+
+    def create_subscription(
+        self, msg_type: Any, topic: str, *args: Any, **kwargs: Any
+    ) -> Subscription[Any]:
+        """As rclpy, which itself hears time on the absolute /clock: here it is relative as well."""
+        topic = CLOCK if topic == CLOCK_TOPIC else topic
+        return super().create_subscription(msg_type, topic, *args, **kwargs)
 
     def finish(self, exit_code: int = 0) -> None:
         """End the process with this exit code once the running callback returns."""

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import sys
+from collections.abc import Mapping, Sequence
 from typing import TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
 from maglev_model import parameters as table
 from maglev_model.parameters import Spec, for_others, unknown_parameter
@@ -21,30 +24,59 @@ def is_ros_own(name: str) -> bool:
     return name.split('.')[0] in _ROS_OWN
 
 
-def declare(node: Node, parameter_table: type[T]) -> T:
+def declare(node: Node, name: str, parameter_table: type[T]) -> T:
     """Declare every parameter of a table on a node and return the table as configured.
 
     The node was made with ``automatically_declare_parameters_from_overrides``: so it holds whatever
-    files and command line gave, and a name that is no parameter is seen and refused.
+    files and command line gave, and a name that is no parameter is seen and refused. In a
+    namespace, or renamed, it is also given what files hold for ``name``, its name by itself.
     Raises ParameterError.
     """
     specs = table.specs(parameter_table)
-    given = {
-        name: parameter.value
-        for name, parameter in node.get_parameters_by_prefix('').items()
-        if not is_ros_own(name)
-    }
-    ours = {name: value for name, value in given.items() if not for_others(name, specs)}
-    for name in ours:
-        if name not in specs:
-            raise unknown_parameter(name, specs)
-    built = table.build(parameter_table, ours)
-    for name in given:
-        node.undeclare_parameter(name)
-    for name, value in table.values(built).items():
+    declared = {key: each.value for key, each in node.get_parameters_by_prefix('').items()}
+    given = declared
+    if node.get_fully_qualified_name() != f'/{name}':
+        given = _by_either_name(sys.argv, name, node.get_fully_qualified_name())
+        if 'use_sim_time' in given:
+            node.set_parameters([Parameter('use_sim_time', value=given['use_sim_time'])])
+    built = table.build(parameter_table, _ours(given, specs))
+    for key in declared:
+        if not is_ros_own(key):
+            node.undeclare_parameter(key)
+    for key, value in table.values(built).items():
         value = list(value) if isinstance(value, tuple) else value
-        node.declare_parameter(name, value, descriptor(specs[name]), ignore_override=True)
+        node.declare_parameter(key, value, descriptor(specs[key]), ignore_override=True)
     return built
+
+
+def _ours(given: Mapping[str, object], specs: Mapping[str, Spec]) -> dict[str, object]:
+    """What is given of a table, without what is for others. Raises ParameterError."""
+    ours = {
+        key: value
+        for key, value in given.items()
+        if not is_ros_own(key) and not for_others(key, specs)
+    }
+    for key in ours:
+        if key not in specs:
+            raise unknown_parameter(key, specs)
+    return ours
+
+
+def _by_either_name(arguments: Sequence[str], *names: str) -> dict[str, object]:
+    """What a command line gives a node that has these names: first files, then single values."""
+    files: dict[str, object] = {}
+    single: dict[str, object] = {}
+    is_ros = False
+    for option, value in itertools.pairwise([*arguments, '']):
+        if option == '--ros-args':
+            is_ros = True
+        elif option == '--':
+            is_ros = False
+        elif is_ros and option == '--params-file':
+            files.update(table.read_yaml(value, *names))
+        elif is_ros and option in ('-p', '--param'):
+            single.update(table.read_argument(value, *names))
+    return {**files, **single}
 
 
 def descriptor(spec: Spec) -> ParameterDescriptor:

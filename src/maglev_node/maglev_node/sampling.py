@@ -48,7 +48,7 @@ class Sampling(Generic[P, S]):
         self._timer: Any = None
         self._direct = self._quadrature = np.zeros(4)
         self._newest = self._applied = -1  # sequence of the currents that came, were followed last
-        self._publisher = SamplePublisher(node, truth=stage.truth() is not None)
+        self._publisher = SamplePublisher(node, stage.sample_time, truth=stage.truth() is not None)
         self._answers: Any = None
         self._pace: Pace = StageClock(stage.sample_time)
         if not stage.paced:
@@ -68,6 +68,7 @@ class Sampling(Generic[P, S]):
         self._sample = self.stage.read()
         self.sequence += 1
         self._sample_time = time.monotonic()
+        self._publisher.start()
         self._pace.start(self.sequence)
         period, action = self._pace.period, self._on_tick
         if self._answers is not None:

@@ -1,15 +1,18 @@
-"""Time stamps for the 1 kHz loop."""
+"""Time stamps for the 1 kHz loop, without a clock object or a new message."""
 
 from __future__ import annotations
-
-import time
 
 from builtin_interfaces.msg import Time
 
 
-def stamp_now(stamp: Time) -> None:
-    """Set a message's stamp to the wall clock, without a clock object or a new message."""
-    stamp.sec, stamp.nanosec = divmod(time.time_ns(), 1_000_000_000)
+def set_stamp(stamp: Time, nanoseconds: int) -> None:
+    """Set a message's stamp to a time since the epoch [ns]."""
+    stamp.sec, stamp.nanosec = divmod(nanoseconds, 1_000_000_000)
+
+
+def nanoseconds(stamp: Time) -> int:
+    """A stamp as time since the epoch [ns]."""
+    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
 
 
 def seconds(stamp: Time) -> float:

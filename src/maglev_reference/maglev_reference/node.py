@@ -18,7 +18,7 @@ from maglev_msgs.msg import Currents, Measurement, Reference
 from maglev_node.graph_guard import GraphGuard, Watchers
 from maglev_node.node import MaglevNode, SourceParameters
 from maglev_node.process import main as run_main
-from maglev_node.stamp import stamp_now
+from maglev_node.stamp import nanoseconds, set_stamp
 from maglev_node.topics import CURRENTS, MEASUREMENT, REFERENCE, reference_qos, sample_qos
 from maglev_reference.accuracy import summary, warnings
 from maglev_reference.check import UnreachableError
@@ -85,6 +85,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         self._run = ReferenceRun(self.parameters, self.parameters.lead, self.parameters.autostart)
         self._watchers = Watchers(self, self.parameters.watchers)
         self._seen = self._reminded = time.monotonic()
+        self._newest_time = 0  # stage time of the newest measurement [ns]
         self._message = Reference()
         self._message.header.frame_id = 'stage'
         self._publisher = self.create_publisher(Reference, REFERENCE, reference_qos())
@@ -103,6 +104,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         for message, _ in self._measurements.take(1):
             if self._run.observe(int(message.sequence)):
                 measurement, self._seen = message, time.monotonic()
+                self._newest_time = nanoseconds(message.header.stamp)
         if not self._run.started:
             self._wait(measurement)
         elif measurement is None:
@@ -152,9 +154,11 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
             return
         first, block = due
         message = self._message
-        stamp_now(message.header.stamp)
+        period = round(1e9 * self.parameters.sample_time)
         for row in range(len(block.phase)):
             message.sequence = first + row
+            ahead = first + row - self._run.newest
+            set_stamp(message.header.stamp, self._newest_time + ahead * period)
             message.phase = int(block.phase[row])
             message.segment = int(block.segment[row])
             message.position = block.position[row]
