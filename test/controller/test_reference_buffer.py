@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from maglev_controller.parameters import ControllerParameters
-from maglev_controller.supervision import Mode, Supervisor
+from maglev_controller.supervision import Supervisor
+from maglev_model.modes import Mode
 from maglev_model.phases import Phase
 
 REST = np.array([0.031, 0.0, 0.0, 0.0, 0.0])

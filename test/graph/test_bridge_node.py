@@ -93,7 +93,7 @@ def test_lockstep_as_every_stage(stage: str, nodes: Nodes, observer: Observer) -
     assert sorted(set(seen)) == list(range(7, 31))
     assert seen == sorted(seen)
     process.signal(signal.SIGTERM)
-    assert process.wait() == 143
+    assert process.wait() == 0
 
 
 @pytest.mark.parametrize('stage', ['plant', 'hw_bridge'])
@@ -201,7 +201,7 @@ def test_a_dead_controller(nodes: Nodes, observer: Observer) -> None:
     assert observer.call('/hw_bridge/reset').success
     assert not observer.call('/hw_bridge/reset').success
     graph['stage'].signal(signal.SIGINT)
-    assert graph['stage'].wait() == 130
+    assert graph['stage'].wait() == 0
 
 
 def test_in_real_time_emulated_boards_bear_a_desktop(nodes: Nodes, observer: Observer) -> None:
@@ -242,5 +242,5 @@ def test_deactivated_in_flight_it_lands_first(nodes: Nodes, observer: Observer) 
 def test_stopped_in_flight_it_lands_first(nodes: Nodes, observer: Observer) -> None:
     graph = fly(nodes, observer)
     graph['stage'].signal(signal.SIGINT)
-    assert graph['stage'].wait() == 130
+    assert graph['stage'].wait() == 0
     observer.wait(lambda: height(observer) > LOWER_STOP - 1e-5)

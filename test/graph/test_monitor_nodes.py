@@ -121,7 +121,7 @@ def test_bag_and_live_run_give_the_same_figures(
     assert monitor.wait() == 0, monitor.output
     assert 'verdict: pass' in monitor.output
     recorder.signal(stop)
-    assert recorder.wait() == 128 + stop
+    assert recorder.wait() == 0
     assert recorded(bag) == dict.fromkeys(TOPICS, SAMPLES)
     assert analyse(bag).result == metrics(nodes)
     assert metrics(nodes)['scenario'] == 'made_up'
@@ -141,7 +141,7 @@ def test_others_read_and_play_a_bag(
     assert feeder.delivered(0.5), 'what is lost would come again only seconds later'
     observer.wait(lambda: sum(recorded(bag).values()) == 5 * SAMPLES)
     recorder.signal(signal.SIGINT)
-    assert recorder.wait() == 130
+    assert recorder.wait() == 0
 
     topics = {
         topic['topic_metadata']['name']: topic
@@ -179,7 +179,7 @@ def test_a_run_that_is_broken_off_leaves_what_there_was(
     observer.wait(lambda: recorded(bag) == complete)  # on the disk, while the recorder runs
     recorder.signal(signal.SIGKILL)
     monitor.signal(signal.SIGTERM)
-    assert monitor.wait() == 143
+    assert monitor.wait() == 0
     assert metrics(nodes)['verdict'] == 'incomplete'
     assert metrics(nodes)['run_samples'] > 900
     assert recorder.wait() == 137

@@ -9,7 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from maglev_model.inverse import CurrentLimits, exact_inverse, simplified_inverse
+from maglev_model.inverse import (
+    CURRENT,
+    LEVITATION,
+    CurrentLimits,
+    exact_inverse,
+    simplified_inverse,
+)
 from maglev_model.machine import MachineParameters, machine_constants
 from maglev_model.platen import accelerations, affine_terms
 
@@ -40,7 +46,7 @@ class Answer:
 
     def __init__(
         self,
-        inverse: Callable[..., bool],
+        inverse: Callable[..., int],
         limits: CurrentLimits,
         output: np.ndarray,
         wanted: np.ndarray,
@@ -48,7 +54,7 @@ class Answer:
     ) -> None:
         self.direct, self.quadrature = np.zeros(4), np.zeros(4)
         self.realised, self.excess = np.zeros(5), np.zeros(2)
-        self.saturated = inverse(
+        self.limited_by = inverse(
             MACHINE,
             limits,
             controlled,
@@ -72,7 +78,7 @@ def test_exact_inverse_inverts_the_full_plant(output: np.ndarray, wanted: np.nda
     tilts = np.array([0.0, 0.0, 0.0, MACHINE.k_s_phi * output[3], MACHINE.k_s_theta * output[4]])
     answer = Answer(exact_inverse, PRIORITY, output, wanted - tilts)
     np.testing.assert_allclose(answer.plant, wanted - tilts, rtol=1e-9, atol=1e-9)
-    assert not answer.saturated
+    assert answer.limited_by == 0
     np.testing.assert_allclose(answer.quadrature[[0, 1]], answer.quadrature[[2, 3]])
 
 
@@ -115,7 +121,9 @@ def test_limits_hold_whatever_is_wanted(output: np.ndarray, wanted: np.ndarray) 
     assert np.all(amplitude <= PRIORITY.current * (1.0 + 1e-9))
     np.testing.assert_allclose(answer.plant, answer.realised, rtol=1e-9, atol=1e-9)
     met = np.allclose(answer.plant, wanted, rtol=1e-6, atol=1e-6)
-    assert met or answer.saturated
+    assert met or answer.limited_by != 0
+    at_limit = bool(np.any(amplitude >= PRIORITY.current * (1.0 - 1e-9)))
+    assert bool(answer.limited_by & CURRENT) == (at_limit and answer.limited_by != 0)
 
 
 @settings(max_examples=100, deadline=None)
@@ -149,7 +157,7 @@ def test_horizontal_acceleration_at_hover_is_enough_for_the_steps() -> None:
 
 
 @pytest.mark.parametrize('inverse', [exact_inverse, simplified_inverse])
-def test_tilts_without_control_get_equal_direct_currents(inverse: Callable[..., bool]) -> None:
+def test_tilts_without_control_get_equal_direct_currents(inverse: Callable[..., int]) -> None:
     """v_φ = v_θ = 0, and the vertical axis still has what it wants with the exact inverse."""
     controlled = np.array([1.0, 1.0, 1.0, 0.0, 0.0])
     output = np.array([0.024, 0.0, 0.0, 0.001, -0.002])
@@ -162,7 +170,7 @@ def test_tilts_without_control_get_equal_direct_currents(inverse: Callable[..., 
 
 
 @pytest.mark.parametrize('inverse', [exact_inverse, simplified_inverse])
-def test_horizontal_axes_without_control_get_no_current(inverse: Callable[..., bool]) -> None:
+def test_horizontal_axes_without_control_get_no_current(inverse: Callable[..., int]) -> None:
     """And y without control gets no direct current."""
     controlled = np.array([0.0, 0.0, 0.0, 1.0, 1.0])
     output = np.array([0.025, 0.01, 0.0, 0.0, 0.0])
@@ -180,5 +188,30 @@ def test_simplified_saturation_is_sat_7() -> None:
     assert answer.quadrature[1] == -7.0
     assert answer.excess[0] == pytest.approx(-7.0 - free.quadrature[1])
     assert answer.excess[1] == 0.0
-    assert answer.saturated
-    assert not free.saturated
+    assert answer.limited_by == CURRENT
+    assert free.limited_by == 0
+
+
+@pytest.mark.parametrize(
+    ('axis', 'wanted', 'limited_by'),
+    [
+        (0, 12.0, LEVITATION),  # fall faster than with the least attraction
+        (0, -1000.0, CURRENT),  # rise faster than the currents make it
+        (3, 500.0, LEVITATION),  # tilt with more than half of the attraction
+        (1, 2.0, 0),
+    ],
+)
+def test_what_limits_is_told(axis: int, wanted: float, limited_by: int) -> None:
+    w = np.zeros(5)
+    w[axis] = wanted
+    answer = Answer(exact_inverse, PRIORITY, np.array([0.025, 0.0, 0.0, 0.0, 0.0]), w)
+    assert answer.limited_by == limited_by
+
+
+def test_quadrature_current_yields_to_levitation_and_is_cut_by_the_current_without() -> None:
+    output, wanted = np.array([0.025, 0.0, 0.0, 0.0, 0.0]), np.array([0.0, 100.0, 0.0, 0.0, 0.0])
+    assert Answer(exact_inverse, PRIORITY, output, wanted).limited_by & LEVITATION
+    plain = Answer(exact_inverse, PRIORITY._replace(levitation_first=0.0), output, wanted)
+    assert plain.limited_by & CURRENT
+    wide = CurrentLimits(current=1000.0, levitation_first=1.0, least_attraction=0.1)
+    assert Answer(exact_inverse, wide, output, wanted).limited_by == LEVITATION

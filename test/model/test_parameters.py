@@ -136,6 +136,20 @@ def test_sections_of_a_node_in_a_namespace(tmp_path: Path, section: str, applies
     assert found == ({'magnet.height': 0.01} if applies else {})
 
 
+@pytest.mark.parametrize(
+    ('text', 'value'),
+    [
+        *(('1e-3', 1e-3), ('-1.5E+2', -150.0), ('3.', 3.0), ('.5', 0.5), ('-.inf', -math.inf)),
+        *(('12', 12), ('-7', -7), ('0x1f', 31), ('0', 0), ('010', 8), ('true', True)),
+        *((text, text) for text in ('2026-01-31', '12:30', '1_000', '09', 'e3', '1.2.3', '.')),
+    ],
+)
+def test_values_are_read_as_ros_does(text: str, value: object) -> None:
+    found = parameters.read_argument(f'name:={text}', 'plant')['name']
+    assert found == value
+    assert type(found) is type(value)
+
+
 def test_arguments_are_for_all_nodes_or_one() -> None:
     assert parameters.read_argument('magnet.height:=1e-2', 'plant') == {'magnet.height': 0.01}
     assert parameters.read_argument('plant:names:=[x, y]', 'plant') == {'names': ['x', 'y']}

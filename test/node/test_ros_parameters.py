@@ -36,7 +36,7 @@ def declared(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> tuple[Any, boo
     monkeypatch.setattr(sys, 'argv', command)
     context = rclpy.Context()
     rclpy.init(args=command, context=context)
-    node = Node('plant', context=context, automatically_declare_parameters_from_overrides=True)
+    node = Node('plant', context=context)
     try:
         table = ros_parameters.declare(node, 'plant', Table)
         sim_time = node.get_parameter('use_sim_time').value
@@ -68,11 +68,14 @@ def test_its_own_section_applies_wherever_it_is(
         declared(monkeypatch, *where, '-p', 'frist:=4.0')
 
 
-def test_in_a_namespace_single_values_win(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize('where', [(), ('-r', '__ns:=/lab')])
+def test_single_values_win(
+    where: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     file = tmp_path / 'params.yaml'
     file.write_text(FILE)
     files = '--params-file', str(file)
     single = '-p', 'first:=4', '-p', 'elsewhere:second:=5.0', '--param', 'plant:names:=[c]'
     for arguments in ((*files, *single), (*single, *files)):
-        table, _ = declared(monkeypatch, '-r', '__ns:=/lab', *arguments, '--', '-p', 'second:=6.0')
+        table, _ = declared(monkeypatch, *where, *arguments, '--', '-p', 'second:=6.0')
         assert table == Table(first=4.0, second=3.0, names=('c',))

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from maglev_model.modes import Mode
 from maglev_model.parameters import build
 from maglev_model.phases import Phase
 from maglev_reference.check import UnreachableError
@@ -30,6 +31,7 @@ def run_at(sequence, autostart=True, lead=64):
     assert run.observe(sequence)
     assert run.due() is None
     run.start(REST)
+    run.observe_controller(Mode.WAITING, sequence)
     return run
 
 
@@ -84,14 +86,14 @@ def test_another_stage_is_waited_for_anew_but_not_while_the_platen_flies():
     assert run.phase == Phase.END
     assert run.observe(3)
     assert (run.newest, run.started, run.autostart, run.phase) == (3, False, False, Phase.REST)
-    assert not run.lift_off()
+    assert not run.lift_off(REST)
     assert not run.land()
     run.start(REST)
     first, block = run.due()
     assert first == 3
     assert (block.phase == Phase.REST).all()
-    assert run.lift_off()
-    assert not run.lift_off()
+    assert run.lift_off(REST)
+    assert not run.lift_off(REST)
 
 
 def test_a_start_from_elsewhere_is_refused_and_may_be_tried_again():
@@ -102,3 +104,99 @@ def test_a_start_from_elsewhere_is_refused_and_may_be_tried_again():
     assert not run.started
     run.start(REST)
     assert run.started
+
+
+def test_nothing_beyond_rest_before_a_controller_was_seen():
+    run = ReferenceRun(PARAMETERS, 400, True)
+    run.observe(10)
+    run.start(REST)
+    published = np.concatenate([run.due()[1].phase for _ in range(2)])
+    rest = round(PARAMETERS.lift_off.wait / PARAMETERS.sample_time)
+    assert len(published) == rest
+    assert (published == Phase.REST).all()
+    assert run.due() is None
+    assert run.obstacle()[0]
+    run.observe_controller(Mode.WAITING, 10)
+    first, block = run.due()
+    assert first == 10 + rest
+    assert (block.phase == Phase.LIFT_OFF).all()
+    wanted = Timeline(PARAMETERS, REST).block(rest, len(block.phase))
+    np.testing.assert_array_equal(block.position, wanted.position)
+
+
+@pytest.mark.parametrize('mode', [Mode.DISABLED, Mode.FAULT, Mode.LANDING])
+def test_at_rest_it_goes_on_resting_until_lift_off(mode):
+    run = run_at(0)
+    run.observe_controller(mode, 0)
+    assert run.give_way()
+    assert not run.give_way()
+    assert run.obstacle()[1][-1] == 'enable'
+    run.observe(50)
+    assert (run.due()[1].phase == Phase.REST).all()
+    run.observe_controller(Mode.WAITING, run.newest)
+    assert not run.give_way()
+    assert run.idle
+    assert run.obstacle() == ('', ())
+    assert run.lift_off(REST)
+    assert not run.idle
+
+
+@pytest.mark.parametrize('mode', [Mode.DISABLED, Mode.FAULT, Mode.LANDING, Mode.WAITING])
+def test_in_flight_it_leaves_its_run_for_good(mode):
+    run = run_at(100)
+    while run.due():
+        run.observe(run.newest + 40)
+        run.enter_phase()
+        if run.phase == Phase.HOLD:
+            break
+        run.observe_controller(Mode.REGULATING, run.newest)
+        assert not run.give_way()
+    published = run.newest + run.ahead
+    run.observe_controller(mode, run.newest)
+    assert run.give_way()
+    run.observe(run.newest + 200)
+    first, block = run.due()
+    assert first == published + 1
+    assert (block.phase == Phase.END).all()
+    assert (block.position == REST).all()
+    run.enter_phase()
+    assert run.over
+    assert run.left
+    assert not run.idle  # the platen may still be falling
+    run.observe(run.newest + 1000)
+    while run.due():
+        pass
+    assert run.idle
+    run.observe_controller(Mode.WAITING, run.newest)
+    assert not run.give_way()
+    moved = np.array([0.0309, 1e-4, 0.0, 0.0, 0.0])
+    assert run.lift_off(moved)
+    assert not run.left
+    run.observe(run.newest + 64)
+    assert (run.due()[1].position == moved).all()
+
+
+def test_after_a_landing_it_lifts_off_only_from_the_lower_stop():
+    run = run_at(0)
+    assert run.land()
+    run.observe(10)
+    with pytest.raises(UnreachableError, match='not on its lower stop'):
+        run.lift_off(np.array([0.018, 0.0, 0.0, 0.0, 0.0]))
+    run.observe(1000)
+    assert (run.due()[1].phase == Phase.END).all()
+    assert run.lift_off(REST)
+
+
+def test_a_state_of_another_stage_says_nothing_of_this_one():
+    run = run_at(0)
+    run.observe(3)
+    run.observe_controller(Mode.WAITING, 900)  # in its flight, of which sample 3 is before
+    assert not run.give_way()
+
+
+def test_slowly_is_what_the_newest_sample_waits_for():
+    run = run_at(0)
+    first, block = run.due(slowly=True)
+    assert (first, len(block.phase)) == (0, 1)
+    assert run.due(slowly=True) is None
+    assert len(run.due()[1].phase) == 63

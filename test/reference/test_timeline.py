@@ -214,15 +214,16 @@ def test_without_autostart_it_rests_until_lift_off():
     timeline = Timeline(parameters, autostart=False)
     assert timeline.end is None
     assert (timeline.block(10**9, 300).phase == Phase.REST).all()
-    assert timeline.lift_off(1000)
-    assert not timeline.lift_off(1001)
+    rest = timeline.block(0, 1).position[0]
+    assert timeline.lift_off(1000, rest)
+    assert not timeline.lift_off(1001, rest)
     block = timeline.block(1000, 3000)
     started = Timeline(parameters).block(0, 3000)
     assert block.position == pytest.approx(started.position, abs=1e-15)
     assert (block.phase == started.phase).all()
     assert (block.segment == started.segment + 1).all()
     assert timeline.land(timeline.end) is False
-    assert timeline.lift_off(timeline.end + 50)
+    assert timeline.lift_off(timeline.end + 50, rest)
 
 
 def test_an_unreachable_reference_is_refused_without_autostart_too():

@@ -272,10 +272,10 @@ def test_two_runs_are_bit_identical_and_equal_the_stepwise_loop() -> None:
     for k, reference in enumerate(zip(*references, strict=True)):
         sample = plant.read()
         np.testing.assert_array_equal(plant.state, first.state[k])
-        saturated = reg.step(*sample, *reference, direct, quadrature)
+        limited_by = reg.step(*sample, *reference, direct, quadrature)
         np.testing.assert_array_equal(direct, first.direct_current[k])
         np.testing.assert_array_equal(quadrature, first.quadrature_current[k])
-        assert saturated == first.saturated[k]
+        assert limited_by == first.limited_by[k]
         plant.write(direct, quadrature)
 
 

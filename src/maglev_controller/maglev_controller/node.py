@@ -11,11 +11,13 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import SetBool, Trigger
 
 from maglev_controller.parameters import ControllerParameters
-from maglev_controller.supervision import Mode, Supervisor
+from maglev_controller.supervision import Supervisor
+from maglev_model.modes import Mode
 from maglev_model.parameters import build, parameter, specs, values
 from maglev_model.phases import Phase
 from maglev_msgs.msg import ControllerState, Currents, Measurement, Reference
 from maglev_node.graph_guard import GraphGuard, Watchers
+from maglev_node.mode_check import mode_conflict
 from maglev_node.node import MaglevNode, SourceParameters
 from maglev_node.process import main as run_main
 from maglev_node.stamp import copy_stamp
@@ -30,6 +32,8 @@ from maglev_node.topics import (
 
 _REFERENCE_PERIOD = 2e-3  # between two looks at what references have arrived [s]
 _HAND_PERIOD = 2e-4  # between two looks at the queues during a redesign [s]
+_WATCH_PERIOD = 0.05  # between two looks at an answer that waits [s]
+_IDLE_PATIENCE = 0.04  # for a reference without which nothing is lost [s]
 _SILENCE = 0.5  # without a sample for this long the stage is taken for stopped [s]
 
 
@@ -89,7 +93,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         self.create_service(Trigger, '~/emergency_stop', self._on_emergency_stop)
         self.create_service(Trigger, '~/reset', self._on_reset)
         self.create_timer(_REFERENCE_PERIOD, self._take_references, clock=self.steady_clock)
-        self.create_timer(0.05, self._watch, clock=self.steady_clock)
+        self.create_timer(_WATCH_PERIOD, self._watch, clock=self.steady_clock)
         self.take_realtime_priority()
         for line in self.supervisor.regulator.describe_loops():
             self.get_logger().info(line)
@@ -117,6 +121,8 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
 
     def _on_measurement(self, message: Measurement) -> None:
         sequence = message.sequence
+        if self._in_another_mode(message):
+            return
         if self._sequence < 0 and not self._watchers.there(CURRENTS, CONTROLLER_STATE):
             return
         if sequence == self._sequence:  # repeated: the answer was not heard
@@ -141,14 +147,22 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
             return
         self._answer(message)
 
+    def _in_another_mode(self, message: Measurement) -> bool:
+        """Whether the stage runs in another mode than ours, with which there is no working."""
+        if message.lockstep == self._lockstep:
+            return False
+        if not self.supervisor.flying:  # in flight it is a second one, which will leave
+            self.fail(mode_conflict(self.parameters.mode, message.lockstep))
+        return True
+
     def _awaits_reference(self, sequence: int) -> bool:
+        """Whether an answer waits; without current only so that the loop sleeps, see _watch."""
         supervisor = self.supervisor
-        if self._reference_lost or supervisor.mode not in (Mode.WAITING, Mode.REGULATING):
+        if self._reference_lost or supervisor.mode == Mode.LANDING:
             return False
-        references = supervisor.references
-        if self._reference_over and sequence > references.newest:
+        if supervisor.mode in (Mode.DISABLED, Mode.FAULT) and supervisor.references.newest < 0:
             return False
-        return references.find(sequence) < 0
+        return supervisor.references.find(sequence) < 0
 
     def _answer(self, message: Measurement) -> None:
         self._pending = None
@@ -177,7 +191,8 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         copy_stamp(self._currents.header.stamp, message.header.stamp)
         message.sequence = sequence
         message.mode = int(self.supervisor.mode)
-        message.saturated = self.supervisor.saturated
+        message.limited_by = self.supervisor.limited_by
+        message.saturated = message.limited_by != 0
         message.position = regulator.position
         message.error = regulator.error
         message.error_rate = regulator.error_rate
@@ -194,11 +209,17 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
             self.get_logger().info(text)
 
     def _watch(self) -> None:
-        """In lockstep, give a lost reference up: the answer that waits for it starts a landing."""
+        """In lockstep, give a lost reference up: the answer that waits for it starts a landing.
+
+        Where no current is wanted there is nothing to lose.
+        """
         if self._pending is None or self.supervisor.references.newest < 0:
             return
-        if time.monotonic() - self._pending_since > self.parameters.reference_timeout:
-            self._reference_lost = True
+        waiting = self.supervisor.mode == Mode.WAITING
+        needless = not self.supervisor.flying and (self._reference_over or not waiting)
+        patience = _IDLE_PATIENCE if needless else self.parameters.reference_timeout
+        if time.monotonic() - self._pending_since > patience:
+            self._reference_lost = not needless
             self._answer(self._pending)
 
     def may_stop(self) -> bool:
@@ -276,3 +297,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
 def main() -> None:
     """Entry point of the executable ``controller``."""
     run_main(ControllerNode, 'controller')
+
+
+if __name__ == '__main__':
+    main()

@@ -283,6 +283,30 @@ class OwnLandingParameters:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
+class PlatenLostParameters:
+    """When a platen that is pressed against a stop is given up, and landed."""
+
+    distance: float = parameter(
+        2e-4,
+        unit='m',
+        lower=0.0,
+        upper=0.1,
+        description='an output this near to its stop is at it; of the tilts, at the radius',
+    )
+    time: float = parameter(
+        0.5, unit='s', lower=0.001, upper=60.0, description='time it is there, without a break'
+    )
+    error: tuple[float, ...] = parameter(
+        (1e-3, 1e-3, 1e-3, 1e-3, 1e-3),
+        unit='m, rad',
+        lower=1e-6,
+        upper=1.0,
+        length=5,
+        description='with a larger error than this, per axis',
+    )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class ControllerParameters:
     """All parameters of the regulator. Axes in the paper's output order y, x, z, phi, theta."""
 
@@ -326,6 +350,7 @@ class ControllerParameters:
     limits: LimitParameters = group(LimitParameters)
     measurement: MeasurementParameters = group(MeasurementParameters)
     landing: OwnLandingParameters = group(OwnLandingParameters)
+    lost: PlatenLostParameters = group(PlatenLostParameters)
     machine: MachineParameters = group(MachineParameters)
 
     @property

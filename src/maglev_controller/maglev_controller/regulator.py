@@ -33,8 +33,8 @@ from maglev_controller.laws import control_law
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.sample_step import (
     BAD_REFERENCE,
+    FIRST_FAULT,
     NOT_FINITE,
-    SATURATED,
     WARPED,
     answer_sample,
 )
@@ -143,13 +143,13 @@ class Regulator:
         acceleration: FloatArray,
         direct_out: FloatArray,
         quadrature_out: FloatArray,
-    ) -> bool:
+    ) -> int:
         """Currents for one measurement.
 
         ``gap`` (4,), ``x``, ``z`` [m] are the measurement; ``position``, ``velocity``,
         ``acceleration`` (5,) the reference. Writes i_d and i_q of motors 1..4 [A] to
-        ``direct_out`` and ``quadrature_out`` (4,) and returns whether any was limited. All arrays
-        float64.
+        ``direct_out`` and ``quadrature_out`` (4,) and returns what limited them, as bits of
+        :mod:`maglev_model.inverse`, 0 for nothing. All arrays float64.
 
         Raises :class:`MeasurementFault` when measurement or reference is not finite, out of the
         stops' range or contradicts itself; both outputs are then zero and the regulator's state is
@@ -166,9 +166,9 @@ class Regulator:
             direct_out,
             quadrature_out,
         )
-        if code > SATURATED:
+        if code >= FIRST_FAULT:
             raise MeasurementFault(self.describe(code, gap, x, z))
-        return code == SATURATED
+        return code
 
     def describe(self, code: int, gap: FloatArray, x: float, z: float) -> str:
         """What a fault code of ``control_step`` means for the measurement it came from."""

@@ -35,13 +35,13 @@ counts as a jump; a reference without velocities can still move at 0.2 m/s."""
 LARGEST_REFERENCE: Final = 1e6
 """Sum of all the reference's magnitudes beyond which it is refused, like one that is not finite."""
 
-# What a step returns; above SATURATED it is a fault.
+# What a step returns: what limited the currents, as bits of the module ``inverse``, or a fault.
 OK: Final = 0
-SATURATED: Final = 1
-NOT_FINITE: Final = 2
-WARPED: Final = 3
-OUT_OF_RANGE: Final = 4
-BAD_REFERENCE: Final = 5
+FIRST_FAULT: Final = 4
+NOT_FINITE: Final = 4
+WARPED: Final = 5
+OUT_OF_RANGE: Final = 6
+BAD_REFERENCE: Final = 7
 
 
 @compiled
@@ -187,8 +187,8 @@ def _limited(value: float, limit: float) -> float:
 @compiled
 def _currents(
     settings: Record, machine: Machine, sample: Record, direct: FloatArray, quadrature: FloatArray
-) -> bool:
-    """The inverse of the settings, from w; whether anything was limited."""
+) -> int:
+    """The inverse of the settings, from w; what limited the currents."""
     limits = CurrentLimits(settings.current, settings.levitation_first, settings.least_attraction)
     controlled, wanted = settings.controlled, sample.virtual_input
     realised, excess = sample.realised, sample.excess
@@ -277,14 +277,14 @@ def control_step(
             reference.velocity[index],
             reference.acceleration[index],
         )
-    saturated = _currents(settings, machine, sample, currents.direct, currents.quadrature)
+    limited_by = _currents(settings, machine, sample, currents.direct, currents.quadrature)
     for index in range(5):
-        if not saturated:
+        if limited_by == 0:
             sample.realised[index] = sample.virtual_input[index]
         if settings.observed[index]:
             _predict(settings, records.axes[index], sample.realised[index])
     _advance_models(control, settings, sample)
-    return SATURATED if saturated else OK
+    return limited_by
 
 
 @compiled

@@ -2,29 +2,18 @@
 
 from __future__ import annotations
 
-import enum
-
 import numpy as np
 
 from maglev_controller.bumpless_transfer import ModelMaps, check_retuning
 from maglev_controller.design_process import DesignProcess
 from maglev_controller.landing import Landing
 from maglev_controller.parameters import ControllerParameters
+from maglev_controller.platen_lost import PlatenWatch
 from maglev_controller.reference_buffer import ReferenceBuffer
 from maglev_controller.regulator import MeasurementFault, Regulator
 from maglev_model.axes import FloatArray
+from maglev_model.modes import Mode
 from maglev_model.phases import Phase
-
-
-class Mode(enum.IntEnum):
-    """What the controller is doing; the values of ``ControllerState.mode``."""
-
-    DISABLED = 0  # no current
-    WAITING = 1  # enabled, no current wanted
-    REGULATING = 2
-    LANDING = 3  # by itself
-    FAULT = 4  # latched, no current
-
 
 _FLYING_MARGIN = 5e-4  # above the lower stop, beyond encoder and stop compliance [m]
 
@@ -35,7 +24,8 @@ class Supervisor:
     Without current the platen is slammed into the upper stop from anywhere above the equilibrium,
     so while the measurement can be believed every way out of flight is a landing; only when it
     cannot, the currents are cut at once. ``direct_current`` and ``quadrature_current`` (4,) [A]
-    hold the answer of the last :meth:`step`.
+    hold the answer of the last :meth:`step`, ``limited_by`` what limited it, as bits of
+    :mod:`maglev_model.inverse`.
     """
 
     def __init__(self, parameters: ControllerParameters, *, enabled: bool = True) -> None:
@@ -45,11 +35,13 @@ class Supervisor:
         self.references = ReferenceBuffer()
         self.mode = Mode.WAITING if enabled else Mode.DISABLED
         self.reason = '' if enabled else 'not enabled'
-        self.saturated = False
+        self.limited_by = 0
         self.direct_current: FloatArray = np.zeros(4)
         self.quadrature_current: FloatArray = np.zeros(4)
         self._landing: Landing | None = None
+        self._platen_watch = PlatenWatch(parameters)
         self._row = -1  # of the reference last followed
+        self._may_lift_off = enabled  # a reference in flight is not followed from its middle
         self._segment = -1
         self._lower_stop = parameters.machine.gap_max
 
@@ -60,6 +52,8 @@ class Supervisor:
         rest = np.array([self._lower_stop, 0.0, 0.0, 0.0, 0.0])
         self._regulate(np.full(4, self._lower_stop), 0.0, 0.0, rest, np.zeros(5), np.zeros(5))
         Landing(self.parameters, rest, np.zeros(5), np.zeros(5)).step()
+        self._platen_watch.step(self.regulator.position, self.regulator.error)
+        self._platen_watch.reset()
         self.regulator.reset()
         self._no_current()
 
@@ -82,14 +76,18 @@ class Supervisor:
         if self.flying:
             regulator.take_over(self.regulator, maps)
         self.regulator, self.parameters = regulator, regulator.parameters
+        self._platen_watch = PlatenWatch(regulator.parameters)
         self._lower_stop = regulator.parameters.machine.gap_max
 
     def enable(self) -> tuple[bool, str]:
         """Follow the reference from its next lift-off on; refused while a fault is latched."""
         if self.mode == Mode.FAULT:
             return False, f'{self.reason}; reset first'
+        if self.mode == Mode.LANDING:
+            return False, f'{self.reason}: landing by itself; enable when that is over'
         if self.mode == Mode.DISABLED:
             self.mode, self.reason = Mode.WAITING, ''
+            self._may_lift_off = False
         return True, 'enabled'
 
     def disable(self) -> tuple[bool, str]:
@@ -118,6 +116,7 @@ class Supervisor:
         self.references.stage_began_anew()
         if self.flying:
             self.mode, self.reason = Mode.WAITING, ''
+            self._may_lift_off = False
         self._no_current()
 
     def step(self, row: int, gap: FloatArray, x: float, z: float) -> None:
@@ -127,9 +126,8 @@ class Supervisor:
         flight means that the reference is lost.
         """
         self.references.renewed = False
-        if self.mode == Mode.WAITING and row >= 0 and self._wants_current(row):
-            self.regulator.reset()
-            self.mode = Mode.REGULATING
+        if self.mode == Mode.WAITING and row >= 0:
+            self._await_lift_off(row)
         elif self.mode == Mode.REGULATING and row < 0:
             self._land('the reference stopped')
         elif self.mode == Mode.REGULATING and not self._wants_current(row):
@@ -140,6 +138,15 @@ class Supervisor:
             self._descend(gap, x, z)
         else:
             self._no_current()
+
+    def _await_lift_off(self, row: int) -> None:
+        """Regulate from a lift-off on whose rest before it was seen since the enable."""
+        if not self._wants_current(row):
+            self._may_lift_off = True
+        elif self._may_lift_off:
+            self.regulator.reset()
+            self._platen_watch.reset()
+            self.mode = Mode.REGULATING
 
     def _wants_current(self, row: int) -> bool:
         return self.references.phase[row] not in (Phase.REST, Phase.END)
@@ -167,6 +174,9 @@ class Supervisor:
             references.velocity[row],
             references.acceleration[row],
         )
+        lost = self._platen_watch.step(self.regulator.position, self.regulator.error)
+        if lost and self.mode == Mode.REGULATING:
+            self._land(lost)
 
     def _land(self, reason: str) -> None:
         references, row = self.references, self._row
@@ -197,7 +207,7 @@ class Supervisor:
         acceleration: FloatArray,
     ) -> None:
         try:
-            self.saturated = self.regulator.step(
+            self.limited_by = self.regulator.step(
                 gap,
                 x,
                 z,
@@ -213,4 +223,4 @@ class Supervisor:
     def _no_current(self) -> None:
         self.direct_current[:] = 0.0
         self.quadrature_current[:] = 0.0
-        self.saturated = False
+        self.limited_by = 0

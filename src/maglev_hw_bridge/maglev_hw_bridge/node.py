@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
+from typing import ClassVar
 
 from diagnostic_msgs.msg import DiagnosticStatus
 
@@ -16,6 +17,7 @@ from maglev_node.node import NodeError
 from maglev_node.process import main as run_main
 from maglev_node.stage_node import StageNode
 from maglev_node.stage_parameters import StageNodeParameters
+from maglev_node.topics import TRUE_STATE
 
 _LOAD_PERIOD = 0.1
 """How often the amplifiers' load is looked at [s]."""
@@ -44,6 +46,13 @@ class BridgeNode(StageNode[BridgeNodeParameters, BridgeStage]):
     Configure opens and checks the boards, activate arms their watchdog and enables the amplifiers
     at zero current, deactivate lands softly first, cleanup closes the boards.
     """
+
+    interface: ClassVar[Mapping[str, str]] = {
+        **StageNode.interface,
+        TRUE_STATE: 'published with emulated boards: the true state of the emulated stage',
+        '~/home': 'std_srvs/Trigger: find the zeros of the encoders, the platen on its stops',
+        '~/land': 'std_srvs/Trigger: land without the controller',
+    }
 
     def __init__(self) -> None:
         super().__init__('hw_bridge', BridgeNodeParameters, _make_stage)
@@ -99,3 +108,7 @@ class BridgeNode(StageNode[BridgeNodeParameters, BridgeStage]):
 def main() -> None:
     """Entry point of the executable ``hw_bridge``."""
     run_main(BridgeNode, 'hw_bridge')
+
+
+if __name__ == '__main__':
+    main()

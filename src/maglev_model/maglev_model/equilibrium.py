@@ -12,7 +12,7 @@ import math
 
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
-from maglev_model.inverse import CurrentLimits
+from maglev_model.inverse import CURRENT, CurrentLimits
 from maglev_model.machine import Machine
 from maglev_model.motor import attraction_coefficients
 
@@ -57,7 +57,7 @@ def equilibrium_inverse(
     quadrature: FloatArray,
     realised: FloatArray,
     excess: FloatArray,
-) -> bool:
+) -> int:
     """Currents for w by the gains at the equilibrium ``gap`` [m], each limited by itself.
 
     The other arguments are those of the module ``inverse``.
@@ -85,4 +85,4 @@ def equilibrium_inverse(
     realised[3] = gain_tilt * (direct[0] - direct[2])
     realised[4] = gain_tilt * (direct[3] - direct[1])
     excess[0], excess[1] = sat_x - u_x, sat_z - u_z
-    return bool(saturated)
+    return CURRENT if saturated else 0

@@ -8,13 +8,19 @@ Arguments of both, all arrays float64: ``output`` y, x, z, phi, theta (5,) [m, r
 (5,) [m/s², rad/s²]; ``controlled`` (5,), an axis whose value is 0 gets no control, as the paper's
 v_φ = v_θ = 0. Written: ``direct`` i_d and ``quadrature`` i_q (4,) [A], ``realised`` (5,), the
 accelerations the limited currents give by the inverse's own model, and ``excess`` (2,), sat(u) − u
-of u_x, u_z [A]. Both return whether anything was limited.
+of u_x, u_z [A]. Both return what limited the currents, as bits, 0 for nothing:
+
+- :data:`CURRENT`: a current or a motor's amplitude is at its limit.
+- :data:`LEVITATION` (of the exact inverse): the attraction wanted, of all motors or of a pair, is
+  more or less than currents give; or a tilt wants more than its pair's attraction; or i_q was cut
+  because of the attraction its motor must have. With CURRENT, where that i_q would fit but for the
+  amplitude that i_d leaves.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +30,11 @@ from maglev_model.compiled import compiled
 from maglev_model.machine import Machine
 from maglev_model.motor import attraction_coefficients
 from maglev_model.platen import affine_terms, gaps_from_outputs
+
+CURRENT: Final = 1
+LEVITATION: Final = 2
+
+_AT_LIMIT = 1.0 - 1e-9  # of the limit, for rounding
 
 RESERVE = 1.1
 """Attraction a motor gets at least, in b² i_q²: at 1 its i_d has no slope left to act with."""
@@ -57,7 +68,7 @@ def simplified_inverse(
     quadrature: FloatArray,
     realised: FloatArray,
     excess: FloatArray,
-) -> bool:
+) -> int:
     """The paper's (12) and (8), each current limited by itself; arguments: see the module."""
     gap = np.empty(4)
     gaps_from_outputs(machine, output, gap)
@@ -86,7 +97,7 @@ def simplified_inverse(
     realised[3] = b[0] + b[2] * v_y + b[1] * v_phi
     realised[4] = c[0] + c[2] * v_y + c[1] * v_theta
     excess[0], excess[1] = sat_x - u_x, sat_z - u_z
-    return bool(saturated)
+    return CURRENT if saturated else 0
 
 
 @compiled
@@ -122,7 +133,7 @@ def _single_motor_inverse(
     quadrature: FloatArray,
     realised: FloatArray,
     excess: FloatArray,
-) -> bool:
+) -> int:
     """Motor 2 through the quadratic (2). See the module for the arguments.
 
     ``F_V = M_y (w_y - G)`` and ``F_H = M_x w_x`` with ``F_V = -P``, ``P = (a - b i_d)² + b² i_q²``.
@@ -153,8 +164,28 @@ def _single_motor_inverse(
         realised[axis] = 0.0
     realised[0], realised[1] = machine.G - made / machine.M_y, gain * i_q
     excess[0], excess[1] = i_q - u_x, 0.0
-    missed = abs(made - pull) > 1e-6 * machine.M_y * machine.G
-    return bool(missed or i_q != u_x)
+    limited_by = _cut_by(limits, u_x, i_q, limit)
+    if abs(made - pull) > 1e-6 * machine.M_y * machine.G:
+        limited_by |= CURRENT if limited != i_d else LEVITATION
+        if attraction != pull or square < 0.0:
+            limited_by |= LEVITATION
+    return _with_amplitude(limits, limited_by, limited, i_q)
+
+
+@compiled
+def _cut_by(limits: CurrentLimits, wanted: float, given: float, limit: float) -> int:
+    """What cut an i_q to its ``limit``: the current, or the attraction that leaves less of it."""
+    if given == wanted:
+        return 0
+    return LEVITATION if limit < limits.current else CURRENT
+
+
+@compiled
+def _with_amplitude(limits: CurrentLimits, limited_by: int, i_d: float, i_q: float) -> int:
+    """``limited_by``, with CURRENT where anything was limited and the amplitude is at its limit."""
+    if limited_by != 0 and math.hypot(i_d, i_q) >= _AT_LIMIT * limits.current:
+        return limited_by | CURRENT
+    return limited_by
 
 
 @compiled
@@ -168,7 +199,7 @@ def exact_inverse(
     quadrature: FloatArray,
     realised: FloatArray,
     excess: FloatArray,
-) -> bool:
+) -> int:
     """Per motor through the quadratic (2). See the module for the arguments.
 
     With P the attraction of a motor, (6) and (7) ask for ΣP = M_y (G − w_y), P_1 − P_3 and P_4 −
@@ -190,17 +221,20 @@ def exact_inverse(
     u_x = controlled[1] * wanted[1] / h_x
     u_z = controlled[2] * wanted[2] / h_z
     attraction = np.empty(4)
-    saturated = _allocate(machine, limits, controlled, output, wanted, a, b, u_x, u_z, attraction)
-    sat_x = _clip(u_x, _quadrature_limit(limits, a, b, attraction, 1))
-    sat_z = _clip(u_z, _quadrature_limit(limits, a, b, attraction, 0))
-    saturated = saturated or sat_x != u_x or sat_z != u_z
+    limited_by = _allocate(machine, limits, controlled, output, wanted, a, b, u_x, u_z, attraction)
+    limit_x = _quadrature_limit(limits, a, b, attraction, 1)
+    limit_z = _quadrature_limit(limits, a, b, attraction, 0)
+    sat_x, sat_z = _clip(u_x, limit_x), _clip(u_z, limit_z)
+    limited_by |= _cut_by(limits, u_x, sat_x, limit_x) | _cut_by(limits, u_z, sat_z, limit_z)
     for motor in range(4):
         quadrature[motor] = sat_z if motor % 2 == 0 else sat_x
     for first in range(2):
         together = controlled[3 + first] == 0.0
-        if _direct_currents(limits, a, b, first, together, attraction, quadrature, direct):
-            saturated = True
+        limited_by |= _direct_currents(
+            limits, a, b, first, together, attraction, quadrature, direct
+        )
     for motor in range(4):
+        limited_by = _with_amplitude(limits, limited_by, direct[motor], quadrature[motor])
         root = a[motor] - b[motor] * direct[motor]
         attraction[motor] = root * root + (b[motor] * quadrature[motor]) ** 2
     lever = machine.r / machine.I_x
@@ -210,7 +244,7 @@ def exact_inverse(
     realised[3] = lever * (attraction[0] - attraction[2]) - machine.k_s_phi * output[3]
     realised[4] = lever * (attraction[3] - attraction[1]) - machine.k_s_theta * output[4]
     excess[0], excess[1] = sat_x - u_x, sat_z - u_z
-    return bool(saturated)
+    return limited_by
 
 
 @compiled
@@ -225,8 +259,8 @@ def _allocate(
     u_x: float,
     u_z: float,
     attraction: FloatArray,
-) -> bool:
-    """The attraction each motor shall have, (4,) [N]; returns whether not all is possible."""
+) -> int:
+    """The attraction each motor shall have, (4,) [N]; LEVITATION where not all is possible."""
     weight = machine.M_y * machine.G
     total = machine.M_y * (machine.G - wanted[0])
     if controlled[0] == 0.0:
@@ -252,7 +286,7 @@ def _allocate(
     phi, theta = _clip(phi, along_z), _clip(theta, along_x)
     attraction[0], attraction[2] = 0.5 * (along_z + phi), 0.5 * (along_z - phi)
     attraction[1], attraction[3] = 0.5 * (along_x - theta), 0.5 * (along_x + theta)
-    return bool(saturated)
+    return LEVITATION if saturated else 0
 
 
 @compiled
@@ -293,36 +327,40 @@ def _direct_currents(
     attraction: FloatArray,
     quadrature: FloatArray,
     direct: FloatArray,
-) -> bool:
-    """i_d of motors ``first`` and ``first + 2``, one for both where their tilt gets no control."""
+) -> int:
+    """i_d of motors ``first`` and ``first + 2``, one for both where their tilt gets no control.
+
+    Returns what limited them.
+    """
     one, two = first, first + 2
     spent_one = (b[one] * quadrature[one]) ** 2
     spent_two = (b[two] * quadrature[two]) ** 2
-    saturated = False
     if together:
         square = b[one] * b[one] + b[two] * b[two]
         middle = a[one] * b[one] + a[two] * b[two]
         rest = a[one] ** 2 + a[two] ** 2 + spent_one + spent_two - attraction[one] - attraction[two]
         discriminant = middle * middle - square * rest
-        saturated = discriminant < 0.0
+        impossible = discriminant < 0.0
         direct[one] = (middle - math.sqrt(max(discriminant, 0.0))) / square
         direct[two] = direct[one]
     else:
         square_one, square_two = attraction[one] - spent_one, attraction[two] - spent_two
         # The limit on i_q is computed with the same numbers; what is left below zero is rounding.
-        saturated = (
+        impossible = (
             min(square_one + 1e-9 * attraction[one], square_two + 1e-9 * attraction[two]) < 0.0
         )
         direct[one] = (a[one] - math.sqrt(max(square_one, 0.0))) / b[one]
         direct[two] = (a[two] - math.sqrt(max(square_two, 0.0))) / b[two]
+    limited_by = LEVITATION if impossible else 0
     for motor in (one, two):
         limit = limits.current
         if limits.levitation_first != 0.0:
             limit = math.sqrt(max(limit * limit - quadrature[motor] ** 2, 0.0))
         limited = _clip(direct[motor], limit * (1.0 + 1e-12))
-        saturated = saturated or abs(limited - direct[motor]) > 1e-9
+        if abs(limited - direct[motor]) > 1e-9:
+            limited_by |= CURRENT
         direct[motor] = limited
-    return bool(saturated)
+    return limited_by
 
 
 @compiled
@@ -337,7 +375,7 @@ def _all_currents(
 ) -> None:
     controlled, realised, excess = np.ones(5), np.empty(5), np.empty(2)
     for k in range(outputs.shape[0]):
-        possible[k] = not exact_inverse(
+        limited_by = exact_inverse(
             machine,
             limits,
             controlled,
@@ -348,6 +386,7 @@ def _all_currents(
             realised,
             excess,
         )
+        possible[k] = limited_by == 0
 
 
 def exact_currents(

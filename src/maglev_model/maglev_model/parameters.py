@@ -29,6 +29,12 @@ A node that has no such group leaves it to the others; one that has it refuses w
 """
 
 _METADATA_KEY = 'maglev_parameter'
+_NUMBERS = {
+    'int': r'^[-+]?(0x[0-9a-fA-F]+|0[0-7]*|[1-9]\d*)$',
+    'float': r'^[-+]?(\d+\.\d*|\.\d+|\d+(?=[eE]))([eE][-+]?\d+)?$|^[-+]?\.(inf|Inf|INF)$'
+    r'|^\.(nan|NaN|NAN)$',
+}
+"""What a parameter file writes for a number, by YAML's name of the type."""
 _SCALARS: dict[type, str] = {bool: 'bool', int: 'integer', float: 'double', str: 'string'}
 
 
@@ -319,7 +325,10 @@ def to_yaml(instance: Any, node: str) -> str:
 
 
 class _Loader(yaml.SafeLoader):
-    """Refuses a mapping that names a key twice, of which YAML would silently take the last."""
+    """Takes values as ROS does: 1e-3 is a number, 2026-01-31 and 12:30 are texts.
+
+    Refuses a mapping that names a key twice, of which YAML would silently take the last.
+    """
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         """Raises yaml.YAMLError with the key and its line."""
@@ -339,12 +348,15 @@ class _Dumper(yaml.SafeDumper):
 
 
 _Dumper.add_implicit_resolver('tag:yaml.org,2002:bool', re.compile('^[yYnN]$'), list('yYnN'))
-for _each in (_Loader, _Dumper):
-    _each.add_implicit_resolver(
-        'tag:yaml.org,2002:float',
-        re.compile(r'^[-+]?\d+\.?\d*[eE][-+]?\d+$'),
-        list('-+0123456789'),
-    )
+_Loader.yaml_implicit_resolvers = {
+    first: [each for each in resolvers if each[0].split(':')[-1] not in ('timestamp', *_NUMBERS)]
+    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
+for _kind, _pattern in _NUMBERS.items():
+    for _each in (_Loader, _Dumper):
+        _each.add_implicit_resolver(
+            f'tag:yaml.org,2002:{_kind}', re.compile(_pattern), list('-+.0123456789')
+        )
 
 
 def _flatten(mapping: Mapping[str, Any], prefix: str = '') -> dict[str, object]:

@@ -90,7 +90,9 @@ class ManagedNode(LifecycleNodeMixin, MaglevNode[P]):
             assert self._refusal is not None
             raise self._refusal
 
-    def _transit(self, name: str, *actions: Callable[[], None]) -> TransitionCallbackReturn:
+    def _transit(
+        self, name: str, state: str, *actions: Callable[[], None]
+    ) -> TransitionCallbackReturn:
         try:
             for action in actions:
                 action()
@@ -104,31 +106,32 @@ class ManagedNode(LifecycleNodeMixin, MaglevNode[P]):
             self._refusal = error
             self.get_logger().fatal(f'{name} failed: {error!r}')
             return TransitionCallbackReturn.ERROR
+        self.get_logger().info(f'{name}: {state}')
         return TransitionCallbackReturn.SUCCESS
 
     def on_configure(self, _state: LifecycleState) -> TransitionCallbackReturn:
         """From unconfigured to inactive."""
-        return self._transit('configure', self.configure)
+        return self._transit('configure', 'inactive', self.configure)
 
     def on_activate(self, _state: LifecycleState) -> TransitionCallbackReturn:
         """From inactive to active."""
-        return self._transit('activate', self.activate)
+        return self._transit('activate', 'active', self.activate)
 
     def on_deactivate(self, _state: LifecycleState) -> TransitionCallbackReturn:
         """From active to inactive."""
-        return self._transit('deactivate', self.deactivate)
+        return self._transit('deactivate', 'inactive', self.deactivate)
 
     def on_cleanup(self, _state: LifecycleState) -> TransitionCallbackReturn:
         """From inactive to unconfigured."""
-        return self._transit('cleanup', self.cleanup)
+        return self._transit('cleanup', 'unconfigured', self.cleanup)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """From any state to the end of the process."""
         actions = {'active': (self.deactivate, self.cleanup), 'inactive': (self.cleanup,)}
-        result = self._transit('shutdown', *actions.get(state.label, ()))
+        result = self._transit('shutdown', 'finalized', *actions.get(state.label, ()))
         self.finish(0 if result == TransitionCallbackReturn.SUCCESS else 1)
         return result
 
     def on_error(self, _state: LifecycleState) -> TransitionCallbackReturn:
         """After a defect: release everything and be unconfigured."""
-        return self._transit('clean-up after an error', self.cleanup)
+        return self._transit('clean-up after an error', 'unconfigured', self.cleanup)

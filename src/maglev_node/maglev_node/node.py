@@ -7,7 +7,7 @@ import os
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
@@ -77,8 +77,11 @@ class MaglevNode(PollingNode, Generic[P]):
     it does in :meth:`close`, which runs however the process ends, publishers still working.
     """
 
+    interface: ClassVar[Mapping[str, str]] = {}
+    """The topics and services of the node, each with what it is, for ``--help``."""
+
     def __init__(self, name: str, parameter_table: type[P], **node_options: Any) -> None:
-        super().__init__(name, automatically_declare_parameters_from_overrides=True, **node_options)
+        super().__init__(name, **node_options)
         self.parameters: P = ros_parameters.declare(self, name, parameter_table)
         self.add_on_set_parameters_callback(self._on_set_parameters)
         self.steady_clock = Clock(clock_type=ClockType.STEADY_TIME)

@@ -8,7 +8,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 import rclpy
 from rclpy.duration import Duration
@@ -18,6 +18,7 @@ from rclpy.signals import SignalHandlerOptions
 from maglev_model.parameters import ParameterError
 from maglev_node.dds import prepare_middleware
 from maglev_node.node import MaglevNode, NodeError
+from maglev_node.usage import usage
 
 _DELIVERY_TIME = 0.5
 """Longest wait at the end for readers to have what was published [s]."""
@@ -28,7 +29,9 @@ _BACKGROUND_NICENESS = 5
 def run(make_node: Callable[[], MaglevNode[Any]], name: str) -> int:
     """Run one node to its end and return the exit code of the process.
 
-    SIGINT and SIGTERM end it in order: :meth:`MaglevNode.close` runs and can still publish.
+    SIGINT and SIGTERM end it in order, which is exit code 0 unless the node says otherwise:
+    :meth:`MaglevNode.close` runs and can still publish. A second signal does not wait for
+    :meth:`MaglevNode.may_stop`.
     What the user did wrong is one line on stderr; a defect shows its traceback.
     """
     caught: list[int] = []
@@ -54,21 +57,23 @@ def run(make_node: Callable[[], MaglevNode[Any]], name: str) -> int:
         return 1
     finally:
         _close(node)
-    if node.exit_code is not None:
-        return node.exit_code
-    return 128 + caught[0] if caught else 0
+    return node.exit_code or 0
 
 
-def main(make_node: Callable[[], MaglevNode[Any]], name: str, *, background: bool = False) -> None:
+def main(node: type[MaglevNode[Any]], name: str, *, background: bool = False) -> None:
     """Entry point of an executable: run one node and leave with its exit code.
 
+    With ``--help`` or ``-h`` it only says what the node is.
     A node in the background yields to those of the loop when they want the same core.
     Leaves without the interpreter's own teardown, which may block in the middleware.
     """
+    if {'-h', '--help'} & set(sys.argv[1:]):
+        print(usage(node, name))
+        return
     if background:
         os.nice(_BACKGROUND_NICENESS)
     try:
-        code = run(make_node, name)
+        code = run(cast(Callable[[], MaglevNode[Any]], node), name)
     except Exception:
         sys.excepthook(*sys.exc_info())
         code = 70

@@ -27,22 +27,17 @@ def is_ros_own(name: str) -> bool:
 def declare(node: Node, name: str, parameter_table: type[T]) -> T:
     """Declare every parameter of a table on a node and return the table as configured.
 
-    The node was made with ``automatically_declare_parameters_from_overrides``: so it holds whatever
-    files and command line gave, and a name that is no parameter is seen and refused. In a
-    namespace, or renamed, it is also given what files hold for ``name``, its name by itself.
+    It is given what the command line holds for ``name``, its name by itself, and for the name it
+    has on the graph: files in their order, then single values. (ROS would not give a node in a
+    namespace what is for its name by itself, and would let a file's section for a node win over
+    single values when another file had one for all nodes.) A name that is no parameter is refused.
     Raises ParameterError.
     """
     specs = table.specs(parameter_table)
-    declared = {key: each.value for key, each in node.get_parameters_by_prefix('').items()}
-    given = declared
-    if node.get_fully_qualified_name() != f'/{name}':
-        given = _by_either_name(sys.argv, name, node.get_fully_qualified_name())
-        if 'use_sim_time' in given:
-            node.set_parameters([Parameter('use_sim_time', value=given['use_sim_time'])])
+    given = _given(sys.argv, name, node.get_fully_qualified_name())
+    if 'use_sim_time' in given:
+        node.set_parameters([Parameter('use_sim_time', value=given['use_sim_time'])])
     built = table.build(parameter_table, _ours(given, specs))
-    for key in declared:
-        if not is_ros_own(key):
-            node.undeclare_parameter(key)
     for key, value in table.values(built).items():
         value = list(value) if isinstance(value, tuple) else value
         node.declare_parameter(key, value, descriptor(specs[key]), ignore_override=True)
@@ -62,8 +57,8 @@ def _ours(given: Mapping[str, object], specs: Mapping[str, Spec]) -> dict[str, o
     return ours
 
 
-def _by_either_name(arguments: Sequence[str], *names: str) -> dict[str, object]:
-    """What a command line gives a node that has these names: first files, then single values."""
+def _given(arguments: Sequence[str], *names: str) -> dict[str, object]:
+    """What a command line gives a node that has these names."""
     files: dict[str, object] = {}
     single: dict[str, object] = {}
     is_ros = False

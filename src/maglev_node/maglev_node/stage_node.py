@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping
-from typing import Any, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import Trigger
@@ -16,7 +16,7 @@ from maglev_node.managed_node import ManagedNode
 from maglev_node.node import NodeError
 from maglev_node.sampling import Sampling
 from maglev_node.stage_parameters import StageNodeParameters
-from maglev_node.topics import CURRENTS, MEASUREMENT
+from maglev_node.topics import CLOCK, CURRENTS, MEASUREMENT
 
 _TIMEOUTS = ('answer_timeout', 'watchdog', 'overrun_limit')
 
@@ -31,6 +31,15 @@ class StageNode(ManagedNode[P], Generic[P, S]):
     told to end in flight, it lands first. A fault of the stage is latched until ``~/reset``. How
     samples are taken: :class:`~maglev_node.sampling.Sampling`.
     """
+
+    interface: ClassVar[Mapping[str, str]] = {
+        MEASUREMENT: 'published: what the encoders read, each sample',
+        CURRENTS: 'subscribed: the currents that answer a sample',
+        CLOCK: 'published in lockstep: stage time',
+        '~/emergency_stop': "std_srvs/Trigger: latch a fault, see the fault's remedy",
+        '~/reset': 'std_srvs/Trigger: clear a fault',
+        '~/change_state': 'lifecycle_msgs/ChangeState, with the other life-cycle services',
+    }
 
     def __init__(self, name: str, parameter_table: type[P], make_stage: Callable[[P], S]) -> None:
         super().__init__(name, parameter_table)

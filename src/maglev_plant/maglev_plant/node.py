@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
+from typing import ClassVar
 
 from maglev_node.process import main as run_main
 from maglev_node.stage_node import StageNode
 from maglev_node.stage_parameters import ClockedStageParameters
+from maglev_node.topics import TRUE_STATE
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
 
@@ -17,7 +20,12 @@ class PlantNodeParameters(ClockedStageParameters, PlantParameters):
 
 
 class PlantNode(StageNode[PlantNodeParameters, SimulatedStage]):
-    """Flies the simulated stage."""
+    """Flies the simulated stage, in lockstep or in real time."""
+
+    interface: ClassVar[Mapping[str, str]] = {
+        **StageNode.interface,
+        TRUE_STATE: 'published: the true state at the instant of each measurement',
+    }
 
     def __init__(self) -> None:
         super().__init__('plant', PlantNodeParameters, SimulatedStage)
@@ -32,3 +40,7 @@ class PlantNode(StageNode[PlantNodeParameters, SimulatedStage]):
 def main() -> None:
     """Entry point of the executable ``plant``."""
     run_main(PlantNode, 'plant')
+
+
+if __name__ == '__main__':
+    main()

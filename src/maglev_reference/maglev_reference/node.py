@@ -11,15 +11,24 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import Trigger
 
+from maglev_model.axes import FloatArray
+from maglev_model.modes import Mode
 from maglev_model.parameters import parameter
 from maglev_model.phases import Phase
 from maglev_model.platen import outputs_of_gaps
-from maglev_msgs.msg import Currents, Measurement, Reference
+from maglev_msgs.msg import ControllerState, Measurement, Reference
 from maglev_node.graph_guard import GraphGuard, Watchers
+from maglev_node.mode_check import mode_conflict
 from maglev_node.node import MaglevNode, SourceParameters
 from maglev_node.process import main as run_main
 from maglev_node.stamp import nanoseconds, set_stamp
-from maglev_node.topics import CURRENTS, MEASUREMENT, REFERENCE, reference_qos, sample_qos
+from maglev_node.topics import (
+    CONTROLLER_STATE,
+    MEASUREMENT,
+    REFERENCE,
+    reference_qos,
+    sample_qos,
+)
 from maglev_reference.accuracy import summary, warnings
 from maglev_reference.check import UnreachableError
 from maglev_reference.parameters import ReferenceParameters
@@ -27,6 +36,8 @@ from maglev_reference.run import ReferenceRun
 from maglev_reference.timeline import Timeline
 
 _REMINDER = 5.0  # between two lines about what is waited for [s]
+_IDLE_PERIOD = 0.02  # from one sample to the next while nothing shall move, in lockstep [s]
+_NEWS_TIME = 0.2  # in which an answer shows what a call has changed in the controller [s]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -69,8 +80,8 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
     """Publishes ``reference`` up to ``lead`` samples ahead of the newest measurement.
 
     It looks at the newest measurement on a short timer instead of being woken by each one. The
-    first measurement seen once all subscribers are there tells where the platen rests and becomes
-    sample 0 of the timeline.
+    first measurement seen once all watchers are there tells where the platen rests and becomes
+    sample 0 of the timeline. In lockstep, which waits for it, it is slow while nothing shall move.
     """
 
     def __init__(self) -> None:
@@ -85,39 +96,53 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         self._run = ReferenceRun(self.parameters, self.parameters.lead, self.parameters.autostart)
         self._watchers = Watchers(self, self.parameters.watchers)
         self._seen = self._reminded = time.monotonic()
-        self._newest_time = 0  # stage time of the newest measurement [ns]
         self._message = Reference()
         self._message.header.frame_id = 'stage'
         self._publisher = self.create_publisher(Reference, REFERENCE, reference_qos())
         self._measurements = self.poll(MEASUREMENT, Measurement, sample_qos(1))
-        # In real time nobody waits for the controller but us; in lockstep it waits for us.
-        self._answers = None
-        if self.parameters.mode == 'realtime':
-            self._answers = self.poll(CURRENTS, Currents, sample_qos(1))
+        self._states = self.poll(CONTROLLER_STATE, ControllerState, sample_qos(1))
+        self._lockstep = self.parameters.mode == 'lockstep'
+        self._measured: Measurement | None = None
+        self._published = 0.0  # when, last
         self.create_service(Trigger, '~/lift_off', self._lift_off)
         self.create_service(Trigger, '~/land', self._land)
         self.create_timer(self.parameters.poll_period, self._poll, clock=self.steady_clock)
         self.take_realtime_priority()
 
     def _poll(self) -> None:
-        measurement = None
+        """Take what is new, and publish what is due."""
+        for state, _ in self._states.take(1):
+            self._run.observe_controller(Mode(state.mode), int(state.sequence))
+        news = False
         for message, _ in self._measurements.take(1):
-            if self._run.observe(int(message.sequence)):
-                measurement, self._seen = message, time.monotonic()
-                self._newest_time = nanoseconds(message.header.stamp)
+            if self._run.observe(int(message.sequence)) and self._in_one_mode(message):
+                news, self._measured, self._seen = True, message, time.monotonic()
         if not self._run.started:
-            self._wait(measurement)
-        elif measurement is None:
+            self._wait(news)
+        elif not news:
             self._watch()
         if self._run.started:
+            self._give_way()
             self._publish()
             self._follow_phase()
 
-    def _wait(self, measurement: Measurement | None) -> None:
-        answered = self._answers is None or any(self._answers.take(1))
-        if measurement is not None and answered and not self._watchers.missing(REFERENCE):
-            self._start(measurement)
-        elif time.monotonic() - self._reminded > _REMINDER:
+    def _in_one_mode(self, message: Measurement) -> bool:
+        """Whether the stage runs in our mode; in flight no other one can come."""
+        conflict = mode_conflict(self.parameters.mode, message.lockstep)
+        if conflict and self._run.grounded:
+            self.fail(conflict)
+        return not conflict
+
+    def _wait(self, news: bool) -> None:
+        # In real time nobody waits for the controller but us; in lockstep it waits for us.
+        answered = self._lockstep or self._run.controller is not None
+        if news and answered and not self._watchers.missing(REFERENCE):
+            self._start()
+        else:
+            self._remind()
+
+    def _remind(self) -> None:
+        if time.monotonic() - self._reminded > _REMINDER:
             self._reminded = time.monotonic()
             self.get_logger().info(self._waiting_for())
 
@@ -128,15 +153,19 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
             return f'waiting for {", ".join(missing)} to subscribe to {where}'
         if self._measurements.publisher_count() == 0:
             return f'waiting for a stage on {self._measurements.topic}'
-        return f'waiting for the controller to answer on {self.resolve_topic_name(CURRENTS)}'
+        return f'waiting for a controller on {self._states.topic}'
 
-    def _start(self, measurement: Measurement) -> None:
+    def _position(self) -> FloatArray:
+        """The outputs (5,) [m, rad] that were measured last."""
+        assert self._measured is not None
+        gap, x, z = self._measured.gap, self._measured.x, self._measured.z
+        return outputs_of_gaps(np.array(gap), x, z, self.parameters.machine.radius)
+
+    def _start(self) -> None:
         if not self._graph.alone():
             return
-        radius = self.parameters.machine.radius
-        rest = outputs_of_gaps(np.array(measurement.gap), measurement.x, measurement.z, radius)
         try:
-            self._run.start(rest)
+            self._run.start(self._position())
         except UnreachableError as error:
             self._refuse(str(error))
         else:
@@ -148,17 +177,44 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         if not self._graph.on_probation():
             self.fail(message)
 
+    def _give_way(self) -> None:
+        """Leave the run when the controller does not follow."""
+        flying = not self._run.grounded
+        reason = self._run.give_way()
+        if reason and flying:
+            self.get_logger().error(f'left the run at sample {self._run.newest}: {reason}')
+        elif reason:
+            self.get_logger().warning(f'resting, {self._way_back(reason)}')
+        elif self._run.controller is None:
+            self._remind()
+
+    def _way_back(self, reason: str) -> str:
+        """A reason, and the services to call for a lift-off."""
+        _, calls = self._run.obstacle()
+        publishers = self.get_publishers_info_by_topic(CONTROLLER_STATE)
+        if not publishers:
+            return f'{reason}: nobody publishes {self._states.topic}'
+        who = f'{publishers[0].node_namespace.rstrip("/")}/{publishers[0].node_name}'
+        services = [f'{who}/{call}' for call in calls]
+        services.append(self.resolve_service_name('~/lift_off'))
+        return f'{reason}: call {", then ".join(services)}'
+
     def _publish(self) -> None:
-        due = self._run.due()
-        if due is None:
+        slowly = self._lockstep and self._run.idle
+        if slowly and time.monotonic() - self._published < _IDLE_PERIOD:
+            return
+        due = self._run.due(slowly=slowly)
+        if due is None or self._measured is None:
             return
         first, block = due
+        self._published = time.monotonic()
         message = self._message
+        stage_time = nanoseconds(self._measured.header.stamp)
         period = round(1e9 * self.parameters.sample_time)
         for row in range(len(block.phase)):
             message.sequence = first + row
             ahead = first + row - self._run.newest
-            set_stamp(message.header.stamp, self._newest_time + ahead * period)
+            set_stamp(message.header.stamp, stage_time + ahead * period)
             message.phase = int(block.phase[row])
             message.segment = int(block.segment[row])
             message.position = block.position[row]
@@ -172,6 +228,12 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         if self._run.enter_phase():
             self.get_logger().info(f'{self._run.phase.name} at sample {self._run.newest}')
         if self.parameters.exit_at_end and self._run.over:
+            self._end()
+
+    def _end(self) -> None:
+        if self._run.left:
+            self.fail(f'the run was left: {self._run.left}')
+        else:
             self.finish(0)
 
     def _watch(self) -> None:
@@ -180,7 +242,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
             return
         if self._run.grounded:  # another stage may follow
             if self._run.phase == Phase.END and self.parameters.exit_at_end:
-                self.finish(0)
+                self._end()
             return
         who = 'the stage, or the controller it waits for, has stopped'
         if self._measurements.publisher_count() == 0:
@@ -188,12 +250,25 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         self.fail(f'no measurement for {silent:.1f} s after sample {self._run.newest}: {who}')
 
     def _lift_off(self, _request: Any, response: Any) -> Any:
-        if not self._run.started:
-            response.success, response.message = False, self._waiting_for()
-        else:
-            response.success = self._run.lift_off()
-            response.message = 'lifting off' if response.success else 'the reference is running'
+        until = time.monotonic() + _NEWS_TIME
+        while self._run.obstacle()[0] and time.monotonic() < until:
+            self._poll()
+            time.sleep(self.parameters.poll_period)
+        try:
+            response.success, response.message = self._try_lift_off()
+        except UnreachableError as error:
+            response.success, response.message = False, str(error)
         return response
+
+    def _try_lift_off(self) -> tuple[bool, str]:
+        reason, _ = self._run.obstacle()
+        if not self._run.started:
+            return False, self._waiting_for()
+        if reason:
+            return False, f'lift-off refused: {self._way_back(reason)}'
+        if not self._run.lift_off(self._position()):
+            return False, 'the reference is running'
+        return True, 'lifting off'
 
     def _land(self, _request: Any, response: Any) -> Any:
         if not self._run.started:
@@ -204,7 +279,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         return response
 
     def diagnose(self) -> tuple[bytes, str, Mapping[str, object]]:
-        """WARN while something is waited for."""
+        """WARN while something is waited for, or a run was left."""
         if not self._run.started:
             return DiagnosticStatus.WARN, self._waiting_for(), {}
         facts = {
@@ -212,9 +287,15 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
             'sequence': self._run.newest,
             'ahead': self._run.ahead,
         }
+        if self._run.left:
+            return DiagnosticStatus.WARN, f'left the run: {self._run.left}', facts
         return DiagnosticStatus.OK, 'running', facts
 
 
 def main() -> None:
     """Entry point of the executable ``reference``."""
     run_main(ReferenceNode, 'reference')
+
+
+if __name__ == '__main__':
+    main()

@@ -1,13 +1,28 @@
-"""A reference in use: its timeline by the stage's sample numbers, and how far it is published."""
+"""A reference in use: its timeline by the stage's sample numbers, and when it may be followed.
+
+It wants current only of a controller that regulates: it rests until a controller was seen, and
+leaves its run when the controller does not follow, or lands by itself. After that only a
+:meth:`ReferenceRun.lift_off` makes it fly.
+"""
 
 from __future__ import annotations
 
 from maglev_model.axes import FloatArray
+from maglev_model.modes import Mode
 from maglev_model.phases import Phase
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.timeline import Block, Timeline
 
 _BURST = 128  # samples due at one time, at most; half of what a reader's queue holds
+_STILL = 1.0  # after which a platen on the ground lies still [s]
+
+_GROUND = (Phase.REST, Phase.END)
+
+_OBSTACLES = {
+    Mode.DISABLED: ('the controller is disabled', ('enable',)),
+    Mode.FAULT: ('the controller has cut the currents', ('reset', 'enable')),
+    Mode.LANDING: ('the controller lands by itself', ('enable',)),
+}
 
 
 class ReferenceRun:
@@ -19,10 +34,13 @@ class ReferenceRun:
 
     def __init__(self, parameters: ReferenceParameters, lead: int, autostart: bool) -> None:
         self.autostart = autostart
+        self.controller: Mode | None = None  # as it was last seen
+        self.left = ''  # why the run was left, until the next one
         self.newest = 0
         self.phase = Phase.REST
         self._parameters = parameters
         self._lead = lead
+        self._answered = 0  # the newest sample that the controller has answered
         self._timeline: Timeline | None = None
         self._origin = 0  # the stage's sample that is the timeline's first
         self._next = 0  # the timeline's first sample that is not published
@@ -35,7 +53,16 @@ class ReferenceRun:
     @property
     def grounded(self) -> bool:
         """Whether nothing flies."""
-        return self.phase in (Phase.REST, Phase.END)
+        return self.phase in _GROUND
+
+    @property
+    def idle(self) -> bool:
+        """Whether it has rested for a while, and goes on until :meth:`lift_off`.
+
+        The while is for what may still move after a run that was left.
+        """
+        sample = self.newest - self._origin - round(_STILL / self._parameters.sample_time)
+        return self._timeline is not None and self._timeline.settled(max(sample, 0))
 
     @property
     def over(self) -> bool:
@@ -63,7 +90,7 @@ class ReferenceRun:
             if not self.grounded:
                 return False
             self._timeline, self._next = None, 0
-            self.autostart, self.phase = False, Phase.REST
+            self.autostart, self.phase, self.left = False, Phase.REST, ''
         self.newest = sequence
         return True
 
@@ -75,11 +102,46 @@ class ReferenceRun:
         self._timeline = Timeline(self._parameters, rest, self.autostart)
         self._origin = self.newest
 
-    def due(self) -> tuple[int, Block] | None:
-        """What is to be published now, with the number of its first sample."""
-        wanted = self.newest + self._lead - self._origin
+    def observe_controller(self, mode: Mode, sequence: int) -> None:
+        """Take note of what the controller did at a sample."""
+        self.controller, self._answered = mode, sequence
+
+    def obstacle(self) -> tuple[str, tuple[str, ...]]:
+        """Why the controller would not follow a lift-off, and its services that change that."""
+        if self.controller is None:
+            return 'no controller was seen', ()
+        return _OBSTACLES.get(self.controller, ('', ()))
+
+    def give_way(self) -> str:
+        """Leave the run when the controller does not follow; returns why, once.
+
+        On the stop it then rests, in flight it has ended: what holds the platen up is the
+        controller's own landing.
+        """
+        if self._timeline is None or self.controller is None:
+            return ''
+        reason, _ = self.obstacle()
+        sample = self._answered - self._origin
+        if self.controller == Mode.WAITING and 0 <= sample <= self.newest - self._origin:
+            wanted = self._timeline.phase(sample) not in _GROUND
+            reason = 'the controller does not follow' if wanted else ''
+        if not reason or not self._timeline.abandon(self._next):
+            return ''
+        self.left = reason
+        return reason
+
+    def due(self, *, slowly: bool = False) -> tuple[int, Block] | None:
+        """What is to be published now, with the number of its first sample.
+
+        ``slowly``, that is only what the newest sample itself waits for.
+        """
+        if self._timeline is None:
+            return None
+        wanted = self.newest + (1 if slowly else self._lead) - self._origin
+        if self.controller is None:
+            wanted = min(wanted, self._timeline.segments[0].last + 1)
         count = min(wanted - self._next, _BURST)
-        if self._timeline is None or count <= 0:
+        if count <= 0:
             return None
         first = self._next
         self._next += count
@@ -92,9 +154,16 @@ class ReferenceRun:
             self.phase = self._timeline.phase(self.newest - self._origin)
         return self.phase != before
 
-    def lift_off(self) -> bool:
-        """Start from rest with what is published next; false when it has started already."""
-        return self._timeline is not None and self._timeline.lift_off(self._next)
+    def lift_off(self, rest: FloatArray) -> bool:
+        """Start with what is published next; false when it has started already.
+
+        The platen is at rest at ``rest`` (5,) [m, rad]. Raises UnreachableError where it cannot
+        lift off from there. Whether the controller follows is for :meth:`obstacle` to say.
+        """
+        if self._timeline is None or not self._timeline.lift_off(self._next, rest):
+            return False
+        self.left = ''
+        return True
 
     def land(self) -> bool:
         """Land with what is published next; false when it has landed already, or is about to."""

@@ -68,7 +68,7 @@ class Planner:
         """
         table = self._parameters.lift_off
         home = np.array(self._parameters.home)
-        self._stand(Phase.REST, table.wait)
+        self._stand(Phase.REST, max(table.wait, self._parameters.sample_time))
         beside = np.abs(self._state.position - home) > table.rest_tolerance
         above = np.where(beside, self._state.position, home)
         above[Y] = home[Y]

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from maglev_model.axes import FloatArray, Y
 from maglev_model.phases import Phase
-from maglev_reference.check import check_rest, check_samples
+from maglev_reference.check import UnreachableError, check_rest, check_samples
 from maglev_reference.currents import check_currents
 from maglev_reference.motion import Kinematics, State, state_at
 from maglev_reference.parameters import ReferenceParameters
@@ -72,14 +72,14 @@ class Timeline:
         autostart: bool = True,
     ) -> None:
         self._parameters = parameters
-        start = self._rest_position(rest)
+        self._at_rest = State.at_rest(self._rest_position(rest))
         self._cached_chunk = -1
         self._cache: Block | None = None
-        planner = self._full_plan(State.at_rest(start), 0, 0)
+        planner = self._full_plan(self._at_rest, 0, 0)
         self._adopt(planner.segments)
         self._check()
         if not autostart:
-            planner = Planner(parameters, 0, 0, State.at_rest(start))
+            planner = Planner(parameters, 0, 0, self._at_rest)
             planner.rest()
             self._adopt(planner.segments)
 
@@ -119,16 +119,44 @@ class Timeline:
             return pieces[0]
         return Block.joined(pieces)
 
-    def lift_off(self, first: int) -> bool:
-        """Start from rest at sample ``first``, the first time or after a landing.
+    def settled(self, sample: int) -> bool:
+        """Whether it rests from ``sample`` on, until it is told to lift off."""
+        return self._segments[self._index(sample)].samples is None
 
-        Returns False when it has started already.
+    def lift_off(self, first: int, rest: FloatArray) -> bool:
+        """Start at sample ``first`` from rest at ``rest`` (5,), the first time or after a landing.
+
+        Returns False when it has started already. Raises UnreachableError where the platen cannot
+        lift off from there; it then goes on resting.
         """
         segment = self._segments[self._index(first)]
         if segment.samples is not None:
             return False
-        state = State.at_rest(segment.target)
-        planner = self._full_plan(state, first, segment.number + 1)
+        start = State.at_rest(self._rest_position(rest))
+        planner = self._full_plan(start, first, segment.number + 1)
+        before = self._segments
+        self._replace(first, planner.segments)
+        try:
+            self._check_way_up(first)
+        except UnreachableError:
+            self._adopt(before)
+            raise
+        self._at_rest = start
+        return True
+
+    def abandon(self, first: int) -> bool:
+        """Want no current from sample ``first`` on: REST before a lift-off, END in flight.
+
+        Whoever held the platen up must have seen to its landing. Returns False when it rests.
+        """
+        if self.settled(first):
+            return False
+        segment = self._segments[self._index(max(first - 1, 0))]
+        planner = Planner(self._parameters, first, segment.number + 1, self._at_rest)
+        if segment.phase == Phase.REST:
+            planner.rest()
+        else:
+            planner.end()
         self._replace(first, planner.segments)
         return True
 
@@ -223,6 +251,14 @@ class Timeline:
         measured = (Phase.TRACK, Phase.STEP)
         for segment in sorted(self._segments, key=lambda segment: segment.phase not in measured):
             self._check_range(max(segment.first - 1, 0), min(segment.last, end) + 1)
+
+    def _check_way_up(self, first: int) -> None:
+        """From sample ``first`` to what is measured; that has been checked, and what follows."""
+        measured = (Phase.TRACK, Phase.STEP)
+        stop = next(
+            each.first for each in self._segments if each.first > first and each.phase in measured
+        )
+        self._check_range(first, stop)
 
     def _check_range(self, first: int, stop: int) -> None:
         sample_time = self._parameters.sample_time

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from maglev_controller.control_arrays import ControlArrays, Currents, Reading, Reference
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import MeasurementFault, Regulator
-from maglev_controller.sample_step import SATURATED, control_step
+from maglev_controller.sample_step import FIRST_FAULT, control_step
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
 from maglev_model.records import Block
@@ -27,14 +27,19 @@ class Run:
     """What happened in n samples of the closed loop; row k is sample k.
 
     ``state`` (n, 10) true x1..x10 when the sample was taken; ``direct_current``,
-    ``quadrature_current`` (n, 4) commanded in answer [A]; ``saturated`` (n,) whether some current
-    was limited.
+    ``quadrature_current`` (n, 4) commanded in answer [A]; ``limited_by`` (n,) what limited them, as
+    bits of :mod:`maglev_model.inverse`.
     """
 
     state: FloatArray
     direct_current: FloatArray
     quadrature_current: FloatArray
-    saturated: NDArray[np.bool_]
+    limited_by: NDArray[np.int8]
+
+    @property
+    def saturated(self) -> NDArray[np.bool_]:
+        """Whether some current was limited (n,)."""
+        return np.asarray(self.limited_by != 0)
 
     @property
     def output(self) -> FloatArray:
@@ -66,7 +71,7 @@ def _loop(
             Reference(position[k], velocity[k], acceleration[k]),
             Currents(answer[:4], answer[4:]),
         )
-        if code[k] > SATURATED:
+        if code[k] >= FIRST_FAULT:
             return k
         if delayed:
             advance(block)
@@ -115,7 +120,7 @@ def run(
     if done < n:
         gap, x, z = arrays.reading[:4], float(arrays.reading[4]), float(arrays.reading[5])
         raise MeasurementFault(f'sample {done}: {regulator.describe(int(code[done]), gap, x, z)}')
-    return Run(state, current[:, :4], current[:, 4:], code == SATURATED)
+    return Run(state, current[:, :4], current[:, 4:], code)
 
 
 def warm_up() -> None:
