@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from bag_player import decoded, information, play
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from graph import Nodes, Observer, Process
+from graph import Nodes, Observer, Process, executable
 from made_up_run import TOPICS, Encoder, Run, make_run
 from rclpy.duration import Duration
 from rosbags.rosbag2 import Reader
@@ -75,9 +75,9 @@ class Feeder:
         for publisher in self._publishers.values():
             self._node.destroy_publisher(publisher)
 
-    def diagnose(self, level: bytes, name: str, text: str) -> None:
-        """Publish one status on /diagnostics."""
-        publisher = self._node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+    def diagnose(self, level: bytes, name: str, text: str, namespace: str = '') -> None:
+        """Publish one status on diagnostics, once somebody listens."""
+        publisher = self._node.create_publisher(DiagnosticArray, f'{namespace}/diagnostics', 10)
         while publisher.get_subscription_count() == 0:
             time.sleep(0.02)
         array = DiagnosticArray(status=[DiagnosticStatus(level=level, name=name, message=text)])
@@ -207,6 +207,27 @@ def test_a_fault_fails_the_run(nodes: Nodes, feeder: Feeder) -> None:
     assert 'fault in plant: amplifier 3 is spent' in monitor.output
     assert metrics(nodes)['verdict'] == 'fail'
     assert metrics(nodes)['faults'] == ['plant: amplifier 3 is spent']
+
+
+def test_a_fault_of_another_stage_is_none_of_this_run(nodes: Nodes, feeder: Feeder) -> None:
+    started = {}
+    for namespace in ('/stage1', '/stage2'):
+        output = f'output:={nodes.folder}{namespace}.json'
+        command = [executable('maglev_monitor', 'monitor'), '--ros-args', '-p', output]
+        command += [
+            '-p',
+            'fault_grace:=0.2',
+            '-p',
+            'start_timeout:=4.0',
+            '-r',
+            f'__ns:={namespace}',
+        ]
+        started[namespace] = nodes.run('monitor', command)
+    feeder.diagnose(DiagnosticStatus.ERROR, 'plant', 'amplifier 3 is spent', '/stage2')
+    for namespace, faults in (('/stage1', []), ('/stage2', ['plant: amplifier 3 is spent'])):
+        assert started[namespace].wait() == 1
+        found = json.loads(Path(f'{nodes.folder}{namespace}.json').read_text())
+        assert found['faults'] == faults
 
 
 def test_a_monitor_alone_claims_nothing_of_others_and_says_what_to_look_at(nodes: Nodes) -> None:
