@@ -11,7 +11,16 @@ from typing import NoReturn
 from runner.console import complain, say
 from runner.folder import default_folder
 from runner.graph import Flight, Scenario
-from runner.options import Command, HelpAskedError, Option, WrongUseError, folder, one_of, seconds
+from runner.options import (
+    Command,
+    HelpAskedError,
+    Option,
+    WrongUseError,
+    folder,
+    namespace,
+    one_of,
+    seconds,
+)
 from runner.overlays import PARAMS, check_overlay, overlay
 from runner.paper_tables import fly_all
 from runner.process import installed
@@ -100,6 +109,11 @@ def _flight_command(name: str, description: str, call: str = '') -> Command:
             'OVERLAY.yaml',
             overlay,
         ),
+        '--namespace': Option(
+            'where on the graph the nodes are: several runs, each in its own, fly at once',
+            'NS',
+            namespace,
+        ),
         '--out': _out_option('the run is', name),
     }
     return Command(call or f'{name}.sh', description, options)
@@ -107,13 +121,15 @@ def _flight_command(name: str, description: str, call: str = '') -> Command:
 
 def _flight(scenario: Scenario, command: Command, options: Sequence[str]) -> Flight:
     given = command.parse(options)
+    where = given.get('--namespace', [''])[-1]
     return Flight(
         scenario,
-        out=_out(scenario.name, given),
+        out=_out(scenario.name + where.replace('/', '-'), given),
         stage=given.get('--stage', ['plant'])[-1],
         mode=given.get('--mode', ['lockstep'])[-1],
         duration=given.get('--duration', [''])[-1],
         overlays=tuple(given.get('--params', ())),
+        namespace=where,
     )
 
 

@@ -22,7 +22,11 @@ class Scenario(NamedTuple):
 
 
 class Flight(NamedTuple):
-    """A scenario as the user wants it. ``duration`` is a text [s], empty for the scenario's own."""
+    """A scenario as the user wants it.
+
+    ``duration`` is a text [s], empty for the scenario's own; ``namespace`` an absolute name, empty
+    for none.
+    """
 
     scenario: Scenario
     out: Path
@@ -30,6 +34,7 @@ class Flight(NamedTuple):
     mode: str = 'lockstep'
     duration: str = ''
     overlays: tuple[str, ...] = ()
+    namespace: str = ''
 
     def program(self, node: str) -> list[str]:
         """How to run a node; raises WrongUseError when it is not built."""
@@ -45,6 +50,8 @@ class Flight(NamedTuple):
             *self.overlays,
         ]
         arguments = ['--ros-args', '--disable-external-lib-logs']
+        if self.namespace:
+            arguments += ['-r', f'__ns:={self.namespace}']
         for file in files:
             if Path(file).is_file():
                 arguments += ['--params-file', file]
@@ -63,7 +70,7 @@ class Flight(NamedTuple):
             output = f'output:={self.out}/metrics.json'
             scenario = f'scenario:={self.scenario.name}'
             return ['exit_at_end:=true', output, scenario, f'stage:={self.stage}', mode]
-        values = [mode, 'watchers:=2']
+        values = [mode, "watchers:=['monitor','recorder']"]
         if node == 'reference':
             values += ['autostart:=true', 'exit_at_end:=false']
             if self.mode == 'realtime':

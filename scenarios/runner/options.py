@@ -93,6 +93,17 @@ def seconds(name: str, value: str) -> str:
     return f'{value}0' if '.' in value else f'{value}.0'
 
 
+def namespace(name: str, value: str) -> str:
+    """A namespace of ROS, made absolute."""
+    full = value if value.startswith('/') else f'/{value}'
+    if not re.fullmatch(r'(/[A-Za-z_][A-Za-z0-9_]*)+', full) or '__' in full:
+        raise WrongUseError(
+            f"{name} is '{value}', it must be names of letters, digits and single '_', none"
+            " beginning with a digit, with '/' between them"
+        )
+    return full
+
+
 def folder(name: str, value: str) -> str:
     """The name of a folder."""
     if not value:

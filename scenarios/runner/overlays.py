@@ -26,8 +26,11 @@ def overlay(option: str, name: str) -> str:
     return str(path.resolve())
 
 
-def check_overlay(path: str) -> None:
-    """Refuse a file that no node would take, or that speaks to none. Needs the environment."""
+def check_overlay(path: str, namespace: str = '') -> None:
+    """Refuse a file that no node would take, or that speaks to none. Needs the environment.
+
+    :param namespace: that of the nodes, with which sections may name them too.
+    """
     if sys.flags.no_site:
         site.main()
     import yaml
@@ -41,7 +44,7 @@ def check_overlay(path: str) -> None:
     loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
     content = yaml.compose(Path(path).read_text(encoding='utf-8'), Loader=loader)
     for key, _ in content.value if content else ():
-        if key.value.lstrip('/') not in SECTIONS:
+        if key.value.removeprefix(f'{namespace}/').lstrip('/') not in SECTIONS:
             raise WrongUseError(
                 f"--params: '{path}' has parameters for '{key.value}',"
                 ' which is no node of a scenario'

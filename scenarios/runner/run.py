@@ -8,8 +8,9 @@ from pathlib import Path
 from runner.console import complain, say
 from runner.folder import make_folder, say_where
 from runner.graph import START_ORDER, STOP_ORDER, Flight
+from runner.logs import NodeLog
 from runner.overlays import check_overlay
-from runner.process import NOT_OURS, Process, last_words, program, run_to_end
+from runner.process import Process, program, run_to_end
 from runner.signals import Signals
 
 
@@ -20,12 +21,13 @@ def fly(flight: Flight, signals: Signals) -> int:
     before anything is started.
     """
     for path in flight.overlays:
-        check_overlay(path)
+        check_overlay(path, flight.namespace)
     commands = {node: flight.program(node) for node in START_ORDER}
     analyze = program('maglev_monitor', 'analyze')
     flight = flight._replace(out=make_folder(flight.out))
     name = flight.scenario.name
-    say(f'{name}: {flight.stage}, {flight.mode}, into {flight.out}')
+    where = f' in {flight.namespace}' if flight.namespace else ''
+    say(f'{name}: {flight.stage}, {flight.mode}{where}, into {flight.out}')
     run = Run(flight, signals)
     try:
         passed = run.measure(commands) and not signals.code and run.judge(analyze)
@@ -48,7 +50,10 @@ class Run:
         self._name, self._out = flight.scenario.name, flight.out
         self._signals = signals
         self._nodes: dict[str, Process] = {}
-        self._progress = Progress(self._log('monitor'))
+        self._logs = {
+            node: NodeLog(f'{self._name}: {node}', self._log(node), everything=node == 'monitor')
+            for node in START_ORDER
+        }
 
     def measure(self, commands: Mapping[str, Sequence[str]]) -> bool:
         """Whether the nodes lived until the monitor came to its end, and no signal came before.
@@ -66,7 +71,7 @@ class Run:
             for node in STOP_ORDER:
                 if node in self._nodes:
                     self._nodes[node].stop(self._pause)
-            self._progress.show(rest=True)
+            self._show(rest=True)
 
     def judge(self, analyze: Sequence[str]) -> bool:
         """Whether the nodes ended cleanly, there is a report, and the limits are kept."""
@@ -80,9 +85,9 @@ class Run:
             measured = (self._out / 'metrics.json').is_file()
             early = [node for node in ended if node != 'monitor' or not measured]
             for node in early:
-                words = last_words(self._log(node)) or 'it said nothing'
+                words = self._last_words(node)
                 code = self._nodes[node].code
-                self._complain(f'failed: {node} ended early with exit code {code}: {words}')
+                self._complain(f'failed: {node} ended early with exit code {code}{words}')
                 self._complain(f'its log: {self._log(node)}')
             if ended:
                 return not early
@@ -93,8 +98,8 @@ class Run:
         for node in STOP_ORDER:
             code = self._nodes[node].code
             if node != 'monitor' and code not in (0, 130):
-                words = last_words(self._log(node))
-                self._complain(f'failed: {node} did not end cleanly, exit code {code}: {words}')
+                words = self._last_words(node)
+                self._complain(f'failed: {node} did not end cleanly, exit code {code}{words}')
                 clean = False
         return clean
 
@@ -110,35 +115,20 @@ class Run:
             return False
         return True
 
+    def _last_words(self, node: str) -> str:
+        words = self._logs[node].last_words()
+        return f': {words}' if words else ''
+
     def _log(self, node: str) -> Path:
         return self._out / 'log' / f'{node}.log'
 
     def _pause(self, duration: float) -> None:
         self._signals.pause(duration)
-        self._progress.show()
+        self._show()
+
+    def _show(self, rest: bool = False) -> None:
+        for log in self._logs.values():
+            log.show(rest)
 
     def _complain(self, text: str) -> None:
         complain(f'{self._name}: {text}')
-
-
-class Progress:
-    """Shows what the monitor says, line by line as it comes."""
-
-    def __init__(self, log: Path) -> None:
-        self._log = log
-        self._position = 0
-
-    def show(self, rest: bool = False) -> None:
-        """Print the lines that have come since; at the end, the rest without a line's end too."""
-        try:
-            with self._log.open('rb') as file:
-                file.seek(self._position)
-                new = file.read()
-        except FileNotFoundError:
-            return
-        if not rest:
-            new = new[: new.rfind(b'\n') + 1]
-        self._position += len(new)
-        for line in new.decode(errors='replace').splitlines():
-            if not line.startswith(NOT_OURS):
-                say(line)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from bag_player import decoded, information, play
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from graph import Nodes, Observer, Process
+from graph import Nodes, Observer, Process, executable
 from made_up_run import TOPICS, Encoder, Run, make_run
 from rclpy.duration import Duration
 from rosbags.rosbag2 import Reader
@@ -75,9 +75,9 @@ class Feeder:
         for publisher in self._publishers.values():
             self._node.destroy_publisher(publisher)
 
-    def diagnose(self, level: bytes, name: str, text: str) -> None:
-        """Publish one status on /diagnostics."""
-        publisher = self._node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+    def diagnose(self, level: bytes, name: str, text: str, namespace: str = '') -> None:
+        """Publish one status on diagnostics, once somebody listens."""
+        publisher = self._node.create_publisher(DiagnosticArray, f'{namespace}/diagnostics', 10)
         while publisher.get_subscription_count() == 0:
             time.sleep(0.02)
         array = DiagnosticArray(status=[DiagnosticStatus(level=level, name=name, message=text)])
@@ -151,6 +151,11 @@ def test_others_read_and_play_a_bag(
     for topic, message_type in TOPICS.values():
         assert topics[topic]['topic_metadata']['type'] == message_type
         assert topics[topic]['message_count'] == len(messages[topic]) == SAMPLES
+    assert any('recording to' in log.msg for log in messages['/rosout'])
+    with Reader(bag) as reader:
+        connections = [c for c in reader.connections if c.topic == '/stage/currents']
+        times = [time for _, time, _ in reader.messages(connections=connections)]
+    np.testing.assert_array_equal(times[100:], run.stage_time[100:])
     states = np.array([message.state for message in messages['/stage/true_state']])
     np.testing.assert_array_equal(states[:, ::2], run.position)
 
@@ -204,8 +209,42 @@ def test_a_fault_fails_the_run(nodes: Nodes, feeder: Feeder) -> None:
     assert metrics(nodes)['faults'] == ['plant: amplifier 3 is spent']
 
 
-def test_who_is_missing_is_said(nodes: Nodes) -> None:
-    monitor = start_monitor(nodes, 'start_timeout:=1.0')
+def test_a_fault_of_another_stage_is_none_of_this_run(nodes: Nodes, feeder: Feeder) -> None:
+    started = {}
+    for namespace in ('/stage1', '/stage2'):
+        output = f'output:={nodes.folder}{namespace}.json'
+        command = [executable('maglev_monitor', 'monitor'), '--ros-args', '-p', output]
+        command += [
+            '-p',
+            'fault_grace:=0.2',
+            '-p',
+            'start_timeout:=4.0',
+            '-r',
+            f'__ns:={namespace}',
+        ]
+        started[namespace] = nodes.run('monitor', command)
+    feeder.diagnose(DiagnosticStatus.ERROR, 'plant', 'amplifier 3 is spent', '/stage2')
+    for namespace, faults in (('/stage1', []), ('/stage2', ['plant: amplifier 3 is spent'])):
+        assert started[namespace].wait() == 1
+        found = json.loads(Path(f'{nodes.folder}{namespace}.json').read_text())
+        assert found['faults'] == faults
+
+
+def test_a_monitor_alone_claims_nothing_of_others_and_says_what_to_look_at(nodes: Nodes) -> None:
+    started = time.monotonic()
+    monitor = start_monitor(nodes, 'start_timeout:=7.0')
+    monitor.wait_for('no node of the run is seen on domain')
+    assert time.monotonic() - started < 8.0  # five and what it takes to start
+    for words in ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'loopback', 'VPN', 'firewall'):
+        assert words in monitor.output
+    assert monitor.wait() == 1
+    assert 'no run has begun within' in monitor.output
+    assert 'not running' not in monitor.output
+    assert metrics(nodes)['verdict'] == 'incomplete'
+
+
+def test_who_is_missing_is_said(nodes: Nodes, observer: Observer) -> None:
+    monitor = start_monitor(nodes, 'start_timeout:=3.0')
     assert monitor.wait() == 1
     said = 'the stage and the controller and the reference are not running'
     assert said in monitor.output

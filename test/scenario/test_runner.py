@@ -11,8 +11,10 @@ from pathlib import Path
 import pytest
 from stand_ins import NODES, ROOT, Tree
 
-from runner import options, overlays, process, run
+from runner import logs, options, overlays, process
 from runner.folder import make_folder
+
+WATCHERS = "watchers:=['monitor','recorder']"
 
 # As the real one: waits for its child, also through Ctrl-C, which the child has seen as well.
 ROS2 = r"""#!/usr/bin/env python3
@@ -58,9 +60,9 @@ def test_the_nodes_get_their_parameters(tree: Tree) -> None:
         assert tree.files(node)[0] == 'params/machine.yaml'
         assert tree.files(node)[-3:] == over
         assert f'effective_parameters:={tree.out}/params/{node}.yaml' in tree.arguments(node)
-    assert {'mode:=realtime', 'watchers:=2'} <= set(tree.arguments('plant'))
+    assert {'mode:=realtime', WATCHERS} <= set(tree.arguments('plant'))
     reference = tree.arguments('reference')
-    assert {'duration:=3.0', 'autostart:=true', 'watchers:=2', 'lead:=128'} <= set(reference)
+    assert {'duration:=3.0', 'autostart:=true', WATCHERS, 'lead:=128'} <= set(reference)
     monitor = tree.arguments('monitor')
     assert {f'output:={tree.out}/metrics.json', 'scenario:=ellipse', 'stage:=plant'} <= set(monitor)
     assert f'output:={tree.out}/bag' in tree.arguments('recorder')
@@ -225,12 +227,21 @@ def test_a_folder_that_holds_a_run_is_not_touched(tree: Tree) -> None:
         (['--params', 'none.yaml'], "there is no file 'none.yaml'"),
         (['--params', 'typo.yaml'], "parameters for 'contoller', which is no node"),
         (['--params', 'twice.yaml'], "'speed' is given twice"),
+        (['--params', 'other.yaml', '--namespace', 'b'], "parameters for '/a/plant', which is no"),
+        (['--namespace', ''], "--namespace is ''"),
+        (['--namespace', '/'], "--namespace is '/'"),
+        (['--namespace', '1st'], "--namespace is '1st', it must be names of letters"),
+        (['--namespace', 'a/'], "--namespace is 'a/'"),
+        (['--namespace', 'a//b'], "--namespace is 'a//b'"),
+        (['--namespace', 'a__b'], "--namespace is 'a__b'"),
+        (['--namespace', 'a-b'], "--namespace is 'a-b'"),
         (['--params', 'flat.yaml'], "section 'controller' must hold 'ros__parameters'"),
     ],
 )
 def test_options_that_make_no_sense(tree: Tree, options: list[str], words: str) -> None:
     (tree.path / 'typo.yaml').write_text('# why\n\ncontoller:\n  ros__parameters:\n    a: 1\n')
     (tree.path / 'twice.yaml').write_text('plant:\n  ros__parameters: {speed: 1, speed: 2}\n')
+    (tree.path / 'other.yaml').write_text('/a/plant:\n  ros__parameters: {speed: 1}\n')
     (tree.path / 'flat.yaml').write_text('controller:\n  speed: 1\n')
     code, output = tree.run(*options)
     assert code == 2
@@ -245,7 +256,7 @@ def test_help_starts_nothing(tree: Tree) -> None:
     (tree.path / 'setup.sh').write_text('exit 70\n')
     code, output = tree.run('--help')
     assert code == 0
-    for option in ('--stage', '--mode', '--duration', '--params', '--out'):
+    for option in ('--stage', '--mode', '--duration', '--params', '--namespace', '--out'):
         assert option in output
 
 
@@ -325,7 +336,8 @@ def test_a_trajectory_that_makes_no_sense(
 
 
 def test_the_shipped_overlays_are_taken() -> None:
-    for path in sorted((ROOT / 'params').rglob('*.yaml')):
+    others = ROOT / 'params' / 'rosbag2_qos.yaml'  # is for rosbag2
+    for path in sorted({*(ROOT / 'params').rglob('*.yaml')} - {others}):
         name = str(path.relative_to(ROOT / 'params').with_suffix(''))
         assert overlays.overlay('--params', name) == str(path)
         overlays.check_overlay(str(path))
@@ -345,11 +357,79 @@ def test_last_words(tmp_path: Path, log: str, words: str) -> None:
     assert process.last_words(tmp_path / 'none') == ''
 
 
+def test_warnings_of_every_node_are_shown_once(tree: Tree) -> None:
+    tree.behave('controller', 'warn')
+    tree.behave('plant', 'warn')
+    code, output = tree.run()
+    assert code == 0, output
+    for node in ('controller', 'stage'):
+        for words in ('warning: the belt slips', 'error: the belt: broke', 'error: no end'):
+            assert output.count(f'ellipse: {node}: {words}\n') == 1, output
+    assert 'all is well' not in output
+
+
+def test_the_reason_of_an_early_end_is_said_once(tree: Tree) -> None:
+    tree.behave('monitor', 'run')
+    tree.behave('controller', 'fail')
+    code, output = tree.run()
+    assert code == 1
+    assert output.count('the belt broke') == 1, output
+    assert 'ellipse: controller: error: the belt broke\n' in output
+    assert 'ellipse: failed: controller ended early with exit code 1\n' in output
+
+
+def test_a_node_that_warns_without_end_does_not_flood_the_terminal(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = tmp_path / 'controller.log'
+    log.write_text(''.join(f'WARN 1.{n} late at sample {n}\n' for n in range(100)))
+    shown = logs.NodeLog('ellipse: controller', log)
+    shown.show()
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[:20] == [f'ellipse: controller: warning: late at sample {n}' for n in range(20)]
+    assert lines[20:] == [f'ellipse: controller: more warnings and errors are in {log}']
+
+
+def test_what_the_monitor_logs_is_shown_like_that_of_others(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = tmp_path / 'log'
+    log.write_text('y 3.0 um\nWARN 1.0 no node of the run is seen\ny 3.0 um\n')
+    logs.NodeLog('ellipse: monitor', log, everything=True).show()
+    captured = capsys.readouterr()
+    assert captured.out == 'y 3.0 um\ny 3.0 um\n'
+    assert captured.err == 'ellipse: monitor: warning: no node of the run is seen\n'
+
+
+@pytest.mark.parametrize(('given', 'full'), [('stage1', '/stage1'), ('/lab/b_2', '/lab/b_2')])
+def test_all_nodes_are_in_the_namespace(tree: Tree, given: str, full: str) -> None:
+    tree.parameters('mine.yaml', f'{full}/controller')
+    code, output = tree.run('--namespace', given, '--params', 'mine.yaml')
+    assert code == 0, output
+    assert f'ellipse: plant, lockstep in {full}, into {tree.out}' in output
+    for node in NODES:
+        words = tree.arguments(node)
+        assert words[words.index('-r') + 1] == f'__ns:={full}'
+        assert tree.files(node)[-1] == 'mine.yaml'
+
+
+def test_without_a_namespace_none_is_set(tree: Tree) -> None:
+    assert tree.run()[0] == 0
+    assert '-r' not in tree.arguments('plant')
+
+
+def test_runs_in_namespaces_are_left_apart(tree: Tree) -> None:
+    code, output = tree.finish('--namespace', 'lab/b', script='ellipse')
+    assert code == 0, output
+    (folder,) = (tree.path / 'runs').iterdir()
+    assert folder.name.startswith('ellipse-lab-b-')
+
+
 def test_progress_is_shown_in_whole_lines(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     log = tmp_path / 'log'
-    progress = run.Progress(log)
+    progress = logs.NodeLog('ellipse: monitor', log, everything=True)
     progress.show()
     shown = []
     for text in ('y 3.0', ' um\nx', ' 4\n[ros2run]: hm\n', 'last'):

@@ -15,6 +15,9 @@ import pytest
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from maglev_monitor.bag.compare import compare
+from maglev_monitor.bag.reader import Bag
+
 ROOT = Path(__file__).resolve().parents[2]
 MESSAGES = ROOT / 'src' / 'maglev_msgs' / 'msg'
 MARK = 'MAGLEV_SCENARIO_TEST'
@@ -111,6 +114,29 @@ def test_ellipse_leaves_a_run_and_repeats_bit_for_bit(tmp_path: Path) -> None:
         assert shared > figures['run_samples']
         assert np.array_equal(first[:shared, 0], np.arange(shared))
         assert np.array_equal(first[:shared], second[:shared]), f'{topic} differs'
+
+
+def test_two_stages_fly_on_one_domain_at_once_as_each_does_alone(tmp_path: Path) -> None:
+    flights = {'ellipse': 'stage1', 'ellipse_4dof': 'lab/stage2'}
+    options = ('--duration', '1', '--params', soon(tmp_path))
+    together = {}
+    for scenario, namespace in flights.items():
+        called = command(scenario, tmp_path / namespace, '--namespace', namespace, *options)
+        together[scenario] = subprocess.Popen(called, stdout=subprocess.PIPE, text=True)
+    for process in together.values():
+        output, _ = process.communicate(timeout=300)
+        assert process.returncode == 0, output
+    for scenario, namespace in flights.items():
+        assert run(scenario, tmp_path / scenario, *options).returncode == 0
+        bags = Bag(tmp_path / namespace / 'bag'), Bag(tmp_path / scenario / 'bag')
+        found = compare(bags)
+        assert all(topic.equal for topic in found.values()), found
+        sampled = [
+            topic for topic in bags[0].counts if topic not in ('/rosout', '/parameter_events')
+        ]
+        assert all(topic.startswith(f'/{namespace}/') for topic in sampled), sampled
+        assert len(found) == 5
+        assert (tmp_path / namespace / 'report.html').exists()
 
 
 def test_the_paper_on_its_own_model(tmp_path: Path) -> None:

@@ -130,7 +130,7 @@ def test_a_folder_with_runs_is_refused(papers: Tree) -> None:
         ('paper_tables', ('--mode', '--out', '--quick')),
         ('compare', ('--out', '--quick', '--laws', '--bandwidth')),
         ('commission', ('--params', '--current', '--yes')),
-        ('single_motor', ('--stage', '--mode', '--duration', '--params', '--out')),
+        ('single_motor', ('--stage', '--mode', '--duration', '--params', '--namespace', '--out')),
     ],
 )
 def test_help_names_every_option(tree: Tree, script: str, options: tuple[str, ...]) -> None:

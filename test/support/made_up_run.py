@@ -1,4 +1,7 @@
-"""A made-up run: columns, serialized messages and a bag; encoded by rosbags, not by us."""
+"""A made-up run: columns, serialized messages and a bag; encoded by rosbags, not by us.
+
+Messages are those of today, or as they were before the stage had a clock of its own.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +16,15 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from maglev_model.phases import Phase
 from maglev_monitor.bag.writer import BagWriter
+
+FORMER = {
+    'Measurement': 'std_msgs/Header header\nuint64 sequence\nfloat64[4] gap\nfloat64 x\nfloat64 z\n'
+    'uint64 late_samples\n',
+    'ControllerState': 'std_msgs/Header header\nuint64 sequence\nuint8 mode\nbool saturated\n'
+    'float64[5] position\nfloat64[5] error\nfloat64[5] error_rate\nfloat64[5] virtual_input\n'
+    'float64[5] internal_model\n',
+}
+"""Messages that have grown since, as they were."""
 
 MESSAGES = Path(__file__).resolve().parents[2] / 'src' / 'maglev_msgs' / 'msg'
 RADIUS = 0.397
@@ -37,9 +49,17 @@ class Run:
     gap: NDArray[np.float64]
     direct: NDArray[np.float64]
     quadrature: NDArray[np.float64]
-    saturated: NDArray[np.bool_]
+    limited_by: NDArray[np.uint8]
     late: NDArray[np.uint64]
-    stamp: NDArray[np.int64]
+    stamp: NDArray[np.int64]  # wall clock
+
+    @property
+    def saturated(self) -> NDArray[np.bool_]:
+        return self.limited_by > 0
+
+    @property
+    def stage_time(self) -> NDArray[np.int64]:
+        return self.stamp[0] + np.arange(len(self)) * 1_000_000
 
     def __len__(self) -> int:
         return len(self.phase)
@@ -85,20 +105,23 @@ def make_run(n: int = 1200, seed: int = 1) -> Run:
         gap=gap,
         direct=random.uniform(-3.0, 3.0, (n, 4)),
         quadrature=random.uniform(-3.0, 3.0, (n, 4)),
-        saturated=random.random(n) < 0.05,
+        limited_by=np.where(random.random(n) < 0.05, random.integers(1, 4, n), 0).astype(np.uint8),
         late=np.cumsum(random.random(n) < 0.02).astype(np.uint64),
         stamp=1_700_000_000_000_000_000 + np.cumsum(tick),
     )
 
 
 class Encoder:
-    """Serializes a run's messages with rosbags."""
+    """Serializes a run's messages with rosbags; ``former`` ones are stamped by the wall clock."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, former: bool = False, lockstep: bool = True) -> None:
+        self._former, self._lockstep = former, lockstep
         self.store = get_typestore(Stores.ROS2_JAZZY)
         types: dict[str, Any] = {}
         for file in MESSAGES.glob('*.msg'):
-            types.update(get_types_from_msg(file.read_text(), f'maglev_msgs/msg/{file.stem}'))
+            text = FORMER.get(file.stem) if former else None
+            name = f'maglev_msgs/msg/{file.stem}'
+            types.update(get_types_from_msg(text or file.read_text(), name))
         self.store.register(types)
 
     def header(self, stamp: int, frame_id: str) -> Any:
@@ -118,9 +141,20 @@ class Encoder:
                 np.full(5, 2.0),
                 run.target[n],
             ),
-            'measurement': (run.gap[n], run.position[n, 1], run.position[n, 2], run.late[n]),
+            'measurement': (
+                run.gap[n],
+                run.position[n, 1],
+                run.position[n, 2],
+                run.late[n],
+                *(() if self._former else (run.stamp[n], self._lockstep)),
+            ),
             'currents': (run.direct[n], run.quadrature[n]),
-            'controller': (2, bool(run.saturated[n]), *np.zeros((5, 5))),
+            'controller': (
+                2,
+                bool(run.saturated[n]),
+                *np.zeros((5, 5)),
+                *(() if self._former else (run.limited_by[n],)),
+            ),
             'plant': (
                 np.stack([run.position[n], np.full(5, 0.1)], axis=1).ravel(),
                 run.direct[n],
@@ -128,7 +162,7 @@ class Encoder:
                 np.full(4, 0.25),
             ),
         }
-        header = self.header(run.stamp[n], frame_id)
+        header = self.header((run.stamp if self._former else run.stage_time)[n], frame_id)
         message = self.store.types[name](header, n, *fields[key])
         return bytes(self.store.serialize_cdr(message, name))
 

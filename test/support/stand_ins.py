@@ -15,7 +15,7 @@ NODES = ('recorder', 'monitor', 'plant', 'controller', 'reference')
 
 # A node that runs until it is told to end and writes down when it does. What it does instead is in
 # a file named after it, or after it and the folder of the run (monitor@steps): `die`, `stubborn`,
-# or, for the monitor, the exit code it ends with.
+# `warn`, `fail`, or, for the monitor, the exit code it ends with.
 STAND_IN = r"""#!/usr/bin/env bash
 name=${0##*/} tree=@TREE@ out='' what=''
 for word; do
@@ -32,7 +32,13 @@ trap 'ended 143' TERM
 echo $$ >"$tree/pids/$name" # from now on it can be told to end
 case $what in
   die) sleep 0.3; echo '[INFO] all well' >&2; echo 'error: the belt broke' >&2; exit 3 ;;
+  fail) sleep 0.3; echo 'ERROR 1.0 the belt broke' >&2; exit 1 ;;
   stubborn) trap '' INT TERM ;;
+  warn)
+    for time in 1.0 2.0; do echo "WARN $time the belt slips"; echo "INFO $time all is well"; done
+    echo 'ERROR 3.0 the belt: broke'
+    printf 'ERROR 4.0 no end' >&2
+    ;;
   [0-9]) sleep 0.3; echo 'y 3.0 um'; echo '{}' >"$out/metrics.json"; exit "$what" ;;
 esac
 while :; do sleep 0.02; done

@@ -218,6 +218,19 @@ def test_a_bag_without_a_run_is_refused(
         analyse(tmp_path / 'bag')
 
 
+def test_a_bag_with_the_runs_of_two_stages_is_refused(
+    tmp_path: Path, messages: dict[str, list[bytes]]
+) -> None:
+    writer = open_bag(tmp_path / 'bag')
+    for topic in ('/stage/currents', '/stage2/stage/currents'):
+        if topic not in writer.counts:
+            writer.add_topic(topic, 'maglev_msgs/msg/Currents')
+        writer.write(topic, [(messages['currents'][0], 1)])
+    writer.close()
+    with pytest.raises(BagError, match=r'holds more than one run.*/stage2/stage/currents'):
+        read(tmp_path / 'bag')
+
+
 def test_other_messages_of_the_same_name_are_refused(tmp_path: Path) -> None:
     writer = open_bag(tmp_path / 'bag')
     writer.write('/reference', [(b'\x00\x01\x00\x00' + bytes(60), 1)])

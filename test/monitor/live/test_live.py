@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from maglev_model.phases import Phase
+from maglev_monitor.live.discovery import DiscoveryWatch
 from maglev_monitor.live.progress import Progress
 from maglev_monitor.live.silence import SilenceWatch
 from maglev_monitor.metrics.joiner import ROW
@@ -36,6 +37,33 @@ def test_a_node_that_never_spoke_is_named() -> None:
     watch = SilenceWatch(0.0)
     watch.update({'measurement': 0, 'currents': -1, 'reference': 3}, 1.0)
     assert watch.blame(ALL, 2.0) == 'the controller never published a sample'
+
+
+def test_a_broken_discovery_is_said_within_five_seconds_and_once() -> None:
+    watch = DiscoveryWatch(7, '/', 10.0)
+    watch.update([])
+    said = [watch.warning(float(now)) for now in range(10, 20)]
+    assert [bool(text) for text in said].index(True) < 5
+    (warning,) = filter(None, said)
+    for words in (
+        'no node of the run is seen on domain 7. ',
+        'ROS_DOMAIN_ID',
+        'ROS_AUTOMATIC_DISCOVERY_RANGE',
+        'loopback interface',
+        'multicast',
+        'VPN',
+        'firewall',
+        'FASTRTPS_DEFAULT_PROFILES_FILE',
+    ):
+        assert words in warning
+
+
+def test_a_discovery_that_works_is_no_matter() -> None:
+    watch = DiscoveryWatch(7, '/', 10.0)
+    watch.update(['recorder'])
+    watch.update([])
+    assert watch.seen
+    assert not any(watch.warning(float(now)) for now in range(10, 20))
 
 
 def test_progress_line() -> None:

@@ -9,11 +9,14 @@ import pytest
 
 from maglev_model.parameters import build
 from maglev_model.phases import Phase
+from maglev_monitor.live.discovery import DiscoveryWatch
 from maglev_monitor.live.run_watch import RunWatch, WatchParameters
 from maglev_monitor.metrics.decoding import DecodeError
 
 ALL = {'measurement': 1, 'currents': 1, 'reference': 1}
 PARAMETERS = build(WatchParameters, {'start_timeout': 5.0, 'timeout': 2.0, 'fault_grace': 1.0})
+SOMEBODY = DiscoveryWatch(0, '/', 0.0)
+SOMEBODY.update(['plant'])
 Messages = dict[str, list[bytes]]
 
 
@@ -23,7 +26,7 @@ def part(messages: Messages, first: int, last: int) -> Messages:
 
 def test_a_run_is_over_when_every_topic_is_past_its_end(run: Any, messages: Messages) -> None:
     end = int(np.flatnonzero(run.phase == Phase.END)[0])
-    watch = RunWatch(PARAMETERS, 0.0)
+    watch = RunWatch(PARAMETERS, SOMEBODY, 0.0)
     watch.add(part(messages, 0, end))
     assert watch.started
     assert not watch.over(1.0)
@@ -35,7 +38,7 @@ def test_a_run_is_over_when_every_topic_is_past_its_end(run: Any, messages: Mess
 
 
 def test_a_topic_that_lags_at_the_end_has_half_a_second(run: Any, messages: Messages) -> None:
-    watch = RunWatch(PARAMETERS, 0.0)
+    watch = RunWatch(PARAMETERS, SOMEBODY, 0.0)
     watch.add({**messages, 'plant': messages['plant'][:1000]})
     assert not watch.over(1.0)
     assert not watch.over(1.4)
@@ -44,7 +47,7 @@ def test_a_topic_that_lags_at_the_end_has_half_a_second(run: Any, messages: Mess
 
 
 def test_a_fault_is_watched_for_a_while(run: Any, messages: Messages) -> None:
-    watch = RunWatch(PARAMETERS, 0.0)
+    watch = RunWatch(PARAMETERS, SOMEBODY, 0.0)
     watch.add(part(messages, 0, 500))
     assert watch.add_fault(int(run.stamp[400]), 'plant', 'spent', 3.0)
     assert not watch.add_fault(int(run.stamp[410]), 'plant', 'spent again', 3.5)
@@ -54,7 +57,7 @@ def test_a_fault_is_watched_for_a_while(run: Any, messages: Messages) -> None:
 
 
 def test_a_run_that_does_not_begin_or_falls_silent_is_given_up(messages: Messages) -> None:
-    watch = RunWatch(PARAMETERS, 0.0)
+    watch = RunWatch(PARAMETERS, SOMEBODY, 0.0)
     assert watch.given_up(ALL, 4.9) == ''
     assert watch.given_up({**ALL, 'currents': 0}, 5.1) == (
         'no run has begun within 5 s: the controller is not running'
@@ -65,13 +68,20 @@ def test_a_run_that_does_not_begin_or_falls_silent_is_given_up(messages: Message
     assert watch.given_up(ALL, 8.1).startswith('the run has stopped: the ')
 
 
+def test_nobody_is_said_not_to_run_whom_nobody_has_seen() -> None:
+    watch = RunWatch(PARAMETERS, DiscoveryWatch(7, '/stage1', 0.0), 0.0)
+    said = watch.given_up(dict.fromkeys(ALL, 0), 5.1)
+    assert 'no run has begun within 5 s: no node of the run is seen on domain 7 in /stage1' in said
+    assert 'not running' not in said
+
+
 def test_a_run_is_waited_for_for_ever_where_that_is_wanted() -> None:
-    watch = RunWatch(build(WatchParameters, {'start_timeout': 0.0}), 0.0)
+    watch = RunWatch(build(WatchParameters, {'start_timeout': 0.0}), SOMEBODY, 0.0)
     assert watch.given_up(ALL, 1e6) == ''
 
 
 def test_what_is_no_message_is_refused_but_does_not_spoil_the_end(messages: Messages) -> None:
-    watch = RunWatch(PARAMETERS, 0.0)
+    watch = RunWatch(PARAMETERS, SOMEBODY, 0.0)
     watch.add(part(messages, 0, 600))
     with pytest.raises(DecodeError):
         watch.add({'currents': [b'nothing']})

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from made_up_run import Encoder
 
 from maglev_model.phases import Phase
 from maglev_monitor.metrics.decoding import (
@@ -19,6 +20,7 @@ from maglev_monitor.metrics.decoding import (
 )
 from maglev_monitor.metrics.derived import positions
 from maglev_monitor.metrics.joiner import ROW
+from maglev_monitor.metrics.run_metrics import LIMITS
 
 KEYS = tuple(TOPIC_TYPES)
 
@@ -37,11 +39,19 @@ def test_phases_are_those_of_the_message_file(encoder: Any) -> None:
         assert getattr(reference, phase.name) == phase
 
 
+def test_what_limits_currents_is_as_the_message_file_says(encoder: Any) -> None:
+    state = encoder.store.types['maglev_msgs/msg/ControllerState']
+    assert LIMITS == {'current': state.CURRENT, 'levitation': state.LEVITATION}
+
+
 def test_columns_are_what_was_sent(run: Any, messages: dict[str, list[bytes]]) -> None:
     records = {key: decode(key, messages[key]) for key in KEYS}
     for key in KEYS:
         np.testing.assert_array_equal(records[key]['sequence'], np.arange(len(run)))
-        np.testing.assert_array_equal(stamps(records[key]), run.stamp)
+        np.testing.assert_array_equal(stamps(records[key]), run.stage_time)
+    np.testing.assert_array_equal(records['measurement']['wall_time'], run.stamp)
+    assert records['measurement']['lockstep'].all()
+    np.testing.assert_array_equal(records['controller']['limited_by'], run.limited_by)
     np.testing.assert_array_equal(records['reference']['phase'], run.phase)
     np.testing.assert_array_equal(records['reference']['segment'], run.segment)
     np.testing.assert_array_equal(records['reference']['position'], run.reference)
@@ -55,12 +65,30 @@ def test_columns_are_what_was_sent(run: Any, messages: dict[str, list[bytes]]) -
     assert (records['plant']['thermal_load'] == 0.25).all()
 
 
+def test_former_messages_lack_what_was_added(run: Any) -> None:
+    former = Encoder(former=True)
+    for key, added in (('measurement', {'wall_time', 'lockstep'}), ('controller', {'limited_by'})):
+        records = decode(key, [former.message(run, key, n) for n in range(3)])
+        fields = {field.name for field in TOPIC_TYPES[key].fields}
+        assert fields - set(records.dtype.names or ()) == added
+        np.testing.assert_array_equal(stamps(records), run.stamp[:3])
+
+
+def test_messages_before_and_after_a_field_was_added_do_not_mix(run: Any, encoder: Any) -> None:
+    mixed = [source.message(run, 'controller', 0) for source in (encoder, Encoder(former=True))]
+    with pytest.raises(DecodeError, match=r'not every .* has the same fields'):
+        decode('controller', mixed)
+
+
+@pytest.mark.parametrize('former', [False, True])
 @pytest.mark.parametrize('key', KEYS)
-def test_frame_id_may_have_any_length_and_change(key: str, run: Any, encoder: Any) -> None:
+def test_frame_id_may_have_any_length_and_change(key: str, former: bool, run: Any) -> None:
+    encoder = Encoder(former=former)
     frames = ['', 'a', 'stage', 'stage', 'a_long_frame_of_the_stage', 'ü']
     sent = [encoder.message(run, key, n, frame) for n, frame in enumerate(frames)]
     plain = [encoder.message(run, key, n) for n in range(len(frames))]
     with_frames, without = decode(key, sent), decode(key, plain)
+    assert with_frames.dtype.names == without.dtype.names
     for name in without.dtype.names or ():
         np.testing.assert_array_equal(with_frames[name], without[name])
 

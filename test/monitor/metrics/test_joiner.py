@@ -52,6 +52,8 @@ def test_rows_hold_all_topics(run: Any, messages: dict[str, list[bytes]]) -> Non
     assert len(rows) == len(run)
     assert all(rows[f'has_{key}'].all() for key in KEYS)
     np.testing.assert_array_equal(rows['stamp'], run.stamp)
+    np.testing.assert_array_equal(rows['stage_time'], run.stage_time)
+    np.testing.assert_array_equal(rows['limited_by'], run.limited_by)
     np.testing.assert_array_equal(rows['reference'], run.reference)
     np.testing.assert_array_equal(rows['gap'], run.gap)
     np.testing.assert_array_equal(rows['direct_current'], run.direct)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from made_up_run import TOPICS, Encoder, make_run
 
 from maglev_model.axes import AXES
 from maglev_model.parameters import build
@@ -21,6 +22,7 @@ from maglev_monitor.metrics.joiner import ROW, Joiner
 from maglev_monitor.metrics.run_metrics import RunMetrics
 from maglev_monitor.metrics.run_parameters import MetricsParameters, RunParameters
 from maglev_monitor.metrics.step_response import StepTracker
+from maglev_monitor.report.terminal import as_text
 
 RUN = RunParameters()
 
@@ -100,6 +102,10 @@ def test_currents_and_timing(run: Any, records: dict[str, Records]) -> None:
     rms = np.sqrt((run.direct**2 + run.quadrature**2)[moving].mean(axis=0))
     np.testing.assert_allclose(found['currents']['rms'], rms, rtol=1e-12)
     assert found['currents']['saturated_samples'] == np.count_nonzero(run.saturated & moving)
+    assert found['currents']['saturated_by'] == {
+        name: np.count_nonzero((run.limited_by & bit)[moving] > 0)
+        for name, bit in (('current', 1), ('levitation', 2))
+    }
     assert found['currents']['peak_thermal_load'] == 0.25
     timing = found['timing']
     ticks = np.diff(stamp) * 1e-9
@@ -109,6 +115,25 @@ def test_currents_and_timing(run: Any, records: dict[str, Records]) -> None:
     assert timing['late_samples'] == late[-1] - late[0]
     factor = (len(stamp) - 1) * 1e-3 / ((stamp[-1] - stamp[0]) * 1e-9)
     assert timing['real_time_factor'] == pytest.approx(factor, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ('limited_by', 'words'),
+    [
+        ((1, 1, 3), ', 3 samples saturated (3 by current, 1 by levitation)'),
+        ((2,), ', 1 sample saturated (1 by levitation)'),
+        ((), ''),
+    ],
+)
+def test_the_verdict_names_what_saturates(
+    limited_by: tuple[int, ...], words: str, records: dict[str, Records]
+) -> None:
+    state = records['controller'].copy()
+    state['limited_by'] = 0
+    state['limited_by'][700 : 700 + len(limited_by)] = limited_by
+    state['saturated'] = state['limited_by'] > 0
+    found = figures({**records, 'controller': state})
+    assert f'verdict: pass{words}' in as_text(found).splitlines()
 
 
 def test_phase_currents_of_a_turning_vector() -> None:
@@ -134,6 +159,40 @@ def test_bursts_and_block_edges_change_no_bit(records: dict[str, Records]) -> No
         assert figures(records, burst=burst) == once
 
 
+def ranges(numbers: set[int]) -> list[list[int]]:
+    """First and last of each run of consecutive numbers."""
+    firsts = sorted(number for number in numbers if number - 1 not in numbers)
+    lasts = sorted(number for number in numbers if number + 1 not in numbers)
+    return [list(pair) for pair in zip(firsts, lasts, strict=True)]
+
+
+def test_holes_are_named_where_they_fail_a_run(records: dict[str, Records]) -> None:
+    lost = {'plant': [*range(300, 400), 777], 'currents': range(200, 1000, 3)}
+    for key, numbers in lost.items():
+        records[key] = np.delete(records[key], list(numbers))
+    found = figures(records, burst=50)
+    assert found['reasons'] == [
+        'number of missing samples is 368, allowed is 0:'
+        ' currents in 267 holes: 200, 203, 206, 209 and 263 more;'
+        ' plant in 2 holes: 300–399, 777'
+    ]
+    assert len(found['holes']['currents']['samples']) == 20
+    assert found['reasons'][0].partition(': ')[2] in as_text(found)
+
+
+def test_a_gap_of_whole_blocks_is_one_hole(records: dict[str, Records]) -> None:
+    cut = {key: np.delete(part, range(250, 900)) for key, part in records.items()}
+    found, joiner = RunMetrics(RUN), Joiner(block=50)
+    for key, part in cut.items():
+        joiner.add(key, part)
+    for block in joiner.finish():
+        found.add(block)
+    hole = {'count': 1, 'samples': [[250, 899]]}
+    assert found.result()['holes'] == dict.fromkeys(
+        ('reference', 'measurement', 'currents', 'controller', 'plant'), hole
+    )
+
+
 @settings(max_examples=25, deadline=None)
 @given(
     lost=st.dictionaries(
@@ -150,6 +209,10 @@ def test_lost_samples_are_counted_by_topic(lost: dict[str, set[int]], decoded: A
     expected = {key: len(lost.get(key, set())) for key in kept}
     assert found['missing_by_topic'] == expected
     assert found['missing_samples'] == sum(expected.values())
+    assert set(found['holes']) == {key for key, count in expected.items() if count}
+    for key, holes in found['holes'].items():
+        wanted = ranges(lost[key])
+        assert holes == {'count': len(wanted), 'samples': wanted[:20]}
     assert (found['verdict'] == 'pass') == (not any(expected.values()))
 
 
@@ -183,6 +246,8 @@ def test_a_landing_after_the_reference_was_ended_is_no_loss(
     kept['reference'] = reference[~np.isin(reference['sequence'], lost)]
     found = figures(kept, burst=50)
     assert found['missing_by_topic'] == dict.fromkeys(kept, 0) | {'reference': len(lost)}
+    holes = {'count': len(lost), 'samples': [[number, number] for number in lost]}
+    assert found['holes'] == ({'reference': holes} if lost else {})
     assert found['reasons'][-1] == 'the run did not reach its end'
 
 
@@ -196,15 +261,42 @@ def test_a_fault_fails_the_run_unless_it_comes_after_the_end(
     run: Any, records: dict[str, Records]
 ) -> None:
     for sequence, verdict in ((500, 'fail'), (1199, 'pass')):
-        metrics, joiner = RunMetrics(RUN), Joiner()
-        metrics.add_fault(int(run.stamp[sequence]), 'plant', 'spent')
-        for key, part in records.items():
-            joiner.add(key, part)
-        for block in joiner.finish():
-            metrics.add(block)
-        found = metrics.result()
+        found = with_fault(int(run.stamp[sequence]), records)
         assert found['verdict'] == verdict
         assert (found['reasons'] == ['fault in plant: spent']) == (verdict == 'fail')
+
+
+def with_fault(stamp: int, records: dict[str, Records]) -> Any:
+    metrics, joiner = RunMetrics(RUN), Joiner()
+    metrics.add_fault(stamp, 'plant', 'spent')
+    for key, part in records.items():
+        joiner.add(key, part)
+    for block in joiner.finish():
+        metrics.add(block)
+    return metrics.result()
+
+
+@pytest.mark.parametrize('pace', [0.5, 2.0])
+def test_a_fault_is_placed_by_the_clock_that_stamped_it(pace: float) -> None:
+    run, encoder = make_run(), Encoder()
+    run.stamp = run.stamp[0] + ((run.stamp - run.stamp[0]) / pace).astype(np.int64)
+    messages = {key: [encoder.message(run, key, n) for n in range(len(run))] for key in TOPICS}
+    records = {key: decode(key, part) for key, part in messages.items()}
+    end = int(np.flatnonzero(run.phase == Phase.END)[0])
+    for clock in (run.stamp, run.stage_time):
+        assert with_fault(int(clock[end - 10]), records)['verdict'] == 'fail'
+        assert with_fault(int(clock[end]), records)['verdict'] == 'fail'
+        assert with_fault(int(clock[end + 10]), records)['verdict'] == 'pass'
+
+
+def test_figures_are_those_of_former_messages(run: Any, records: dict[str, Records]) -> None:
+    former = Encoder(former=True)
+    messages = {key: [former.message(run, key, n) for n in range(len(run))] for key in TOPICS}
+    found = figures({key: decode(key, part) for key, part in messages.items()})
+    assert found['currents'].pop('saturated_by') == {'current': 0, 'levitation': 0}
+    wanted = figures(records)
+    del wanted['currents']['saturated_by']
+    assert found == wanted
 
 
 # -- steps -----------------------------------------------------------------------------------------

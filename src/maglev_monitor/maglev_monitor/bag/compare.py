@@ -18,7 +18,7 @@ from maglev_model.phases import Phase
 from maglev_monitor.bag.reader import Bag, Batch
 from maglev_monitor.metrics.decoding import TOPIC_TYPES, Records
 
-WALL_CLOCK = ('seconds', 'nanoseconds', 'late_samples')
+WALL_CLOCK = ('seconds', 'nanoseconds', 'late_samples', 'wall_time')
 """Fields that two runs of the same thing need not share."""
 
 
@@ -141,7 +141,7 @@ def _compare(
     if not len(numbers):
         return
     for name in first.dtype.names or ():
-        if name not in ignored:
+        if name not in ignored and name in (second.dtype.names or ()):
             difference = _difference(first[name][left], second[name][right], tolerance)
             _note(comparison, name, numbers, difference)
 

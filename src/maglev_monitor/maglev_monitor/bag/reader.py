@@ -53,6 +53,7 @@ class Bag:
         self.path, self.files = _find(path)
         self.notes: list[str] = []
         self.counts: dict[str, int] = {}
+        self._topics: dict[str, str] = {}  # by key
         self._typestore = get_typestore(Stores.ROS2_JAZZY)
 
     def batches(self) -> Iterator[Batch]:
@@ -109,15 +110,24 @@ class Bag:
     def _batch(self, messages: Sequence[TopicMessages]) -> Batch:
         serialized: defaultdict[str, list[bytes]] = defaultdict(list)
         diagnostics: list[Diagnostic] = []
-        for _, message_type, data in messages:
+        for topic, message_type, data in messages:
             key = KEY_OF_MESSAGE_TYPE.get(message_type)
             if key is not None:
+                self._only(key, topic)
                 serialized[key] += data
             elif message_type == _DIAGNOSTICS:
                 for message in data:
                     diagnostics += self._diagnostics(message)
         samples = {key: decode(key, data) for key, data in serialized.items()}
         return Batch(samples, diagnostics)
+
+    def _only(self, key: str, topic: str) -> None:
+        known = self._topics.setdefault(key, topic)
+        if topic != known:
+            raise BagError(
+                f"the bag '{self.path}' holds more than one run, '{known}' and '{topic}': record"
+                ' each in a bag of its own'
+            )
 
     def _diagnostics(self, data: bytes) -> list[Diagnostic]:
         array: Any = self._typestore.deserialize_cdr(data, _DIAGNOSTICS)

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from rcl_interfaces.msg import ParameterEvent
-from rclpy.qos import QoSProfile
+from rcl_interfaces.msg import Log, ParameterEvent
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rosbags.interfaces import (
     Qos,
     QosDurability,
@@ -22,6 +22,7 @@ from rosbags.interfaces import (
 
 from maglev_model.parameters import parameter
 from maglev_monitor.bag.errors import BagError
+from maglev_monitor.bag.log_time import LogTimes
 from maglev_monitor.bag.writer import BagWriter
 from maglev_node.node import MaglevNode, NodeError, NodeParameters
 from maglev_node.polling import PolledSubscription
@@ -32,8 +33,18 @@ TOPICS: dict[str, type] = {
     **SAMPLE_TOPICS,
     DIAGNOSTICS: DiagnosticArray,
     '/parameter_events': ParameterEvent,
+    '/rosout': Log,
 }
 """What is recorded, with the message types."""
+
+_QOS = {
+    '/rosout': QoSProfile(  # also what was logged before the recorder came
+        history=HistoryPolicy.KEEP_LAST,
+        depth=1000,
+        reliability=ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL,
+    )
+}
 
 _POLL_PERIOD = 0.05
 
@@ -59,9 +70,10 @@ class RecorderNode(MaglevNode[RecorderParameters]):
         )
         self._open()
         self._taps: dict[str, PolledSubscription] = {
-            topic: self.poll(topic, message_type, raw=True)
+            topic: self.poll(topic, message_type, _QOS.get(topic), raw=True)
             for topic, message_type in TOPICS.items()
         }
+        self._log_times = LogTimes()
         self._failed = False
         self._flushed = time.monotonic()
         self.create_timer(_POLL_PERIOD, self._poll, clock=self.steady_clock)
@@ -102,7 +114,8 @@ class RecorderNode(MaglevNode[RecorderParameters]):
                     continue
                 if tap.topic not in self._writer.counts:
                     self._add_topic(tap.topic, TOPICS[topic])
-                self._writer.write(tap.topic, messages)
+                timed = self._log_times.of(type_name(TOPICS[topic]), messages)
+                self._writer.write(tap.topic, timed)
             now = time.monotonic()
             if now - self._flushed > self.parameters.flush_period:
                 self._flushed = now

@@ -38,7 +38,7 @@ class BagWriter:
         self._definitions = Definitions(find_messages)
         self._schemas: dict[str, int] = {}
         self._topics: dict[str, Topic] = {}
-        self._first, self._last = 1 << 63, 0  # times of reception [ns]
+        self._first, self._last = 1 << 63, 0  # times in the bag [ns]
         self._chunks = 0
         self._file: ChunkFile | None = None
         self._mcap: Writer | None = None
@@ -87,7 +87,7 @@ class BagWriter:
         self._topics[topic] = Topic(topic, message_type, definition.type_hash, qos, channel)
 
     def write(self, topic: str, messages: Iterable[tuple[bytes, int]]) -> None:
-        """Write serialized messages of a topic, each with its time of reception [ns].
+        """Write serialized messages of a topic, each with its time in the bag [ns].
 
         Raises :class:`BagError`, as :meth:`flush`.
         """

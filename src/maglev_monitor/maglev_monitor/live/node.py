@@ -11,6 +11,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from maglev_model.parameters import parameter
+from maglev_monitor.live.discovery import DiscoveryWatch
 from maglev_monitor.live.run_watch import RunWatch, WatchParameters
 from maglev_monitor.metrics.decoding import DecodeError
 from maglev_monitor.metrics.result_file import write_metrics
@@ -50,7 +51,10 @@ class MonitorNode(MaglevNode[MonitorParameters]):
     def __init__(self) -> None:
         super().__init__('monitor', MonitorParameters)
         self._check_output()
-        self._watch = RunWatch(self.parameters, time.monotonic())
+        now = time.monotonic()
+        domain = self.context.get_domain_id()
+        self._discovery = DiscoveryWatch(domain, self.get_namespace(), now)
+        self._watch = RunWatch(self.parameters, self._discovery, now)
         self._run_json = run_to_json(self.parameters)
         self._taps: dict[str, PolledSubscription] = {
             topic: self.poll(topic, topics.SAMPLE_TOPICS[topic], raw=True) for topic in KEYS
@@ -119,17 +123,27 @@ class MonitorNode(MaglevNode[MonitorParameters]):
         line = self._watch.line(now)
         if self._watch.started:
             print(line, flush=True)
+        self._look_around(now)
         publishers = {topic: tap.publisher_count() for topic, tap in self._taps.items()}
         for topic, count in publishers.items():
             if count > 1:
                 self._stop_watching(
                     f'{count} nodes publish {self._taps[topic].topic}: stop all but one,'
-                    ' or use another ROS_DOMAIN_ID'
+                    ' or use another namespace or ROS_DOMAIN_ID'
                 )
                 return
         reason = self._watch.given_up({KEYS[topic]: n for topic, n in publishers.items()}, now)
         if reason:
             self._stop_watching(reason)
+
+    def _look_around(self, now: float) -> None:
+        """Say early when discovery does not work, which nothing else would tell."""
+        here, itself = self.get_namespace(), self.get_name()
+        known = self.get_node_names_and_namespaces()
+        self._discovery.update([name for name, where in known if where == here and name != itself])
+        warning = self._discovery.warning(now)
+        if warning:
+            self.get_logger().warning(warning)
 
     def _on_diagnostics(self, message: Any) -> None:
         for status in message.status:

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from maglev_model.parameters import parameter
+from maglev_monitor.live.discovery import DiscoveryWatch
 from maglev_monitor.live.progress import Progress
 from maglev_monitor.live.silence import SilenceWatch
 from maglev_monitor.metrics.decoding import DecodeError, decode
@@ -37,10 +38,11 @@ class WatchParameters(RunParameters):
 
 
 class RunWatch:
-    """Takes the messages of a run as they come."""
+    """Takes the messages of a run as they come, and who is there with ``discovery``."""
 
-    def __init__(self, parameters: WatchParameters, now: float) -> None:
+    def __init__(self, parameters: WatchParameters, discovery: DiscoveryWatch, now: float) -> None:
         self._parameters = parameters
+        self._discovery = discovery
         self._joiner = Joiner()
         self._metrics = RunMetrics(parameters)
         self._progress = Progress(parameters)
@@ -107,6 +109,8 @@ class RunWatch:
                 return f'the run has stopped: {self._silence.blame(publishers, now)}'
         elif 0.0 < self._parameters.start_timeout < waited:
             blame = self._silence.blame(publishers, now)
+            if not self._discovery.seen:
+                blame = self._discovery.nobody()
             return f'no run has begun within {waited:.0f} s: {blame}'
         return ''
 

@@ -135,10 +135,12 @@ def decode(key: str, messages: Sequence[bytes]) -> Records:
     if len(messages) == 1:
         raise DecodeError(f'a message of {len(first)} bytes is no {TOPIC_TYPES[key].message_type}')
     parts = [decode(key, [message]) for message in messages]
-    common = _record_type(key, 1, _size(key, 1))
-    joined = np.zeros(len(parts), common)
+    names = parts[0].dtype.names or ()
+    if any(part.dtype.names != names for part in parts):
+        raise DecodeError(f'not every {TOPIC_TYPES[key].message_type} has the same fields')
+    joined = np.zeros(len(parts), [(name, parts[0].dtype[name]) for name in names])
     for index, part in enumerate(parts):
-        for name in part.dtype.names or ():
+        for name in names:
             joined[name][index] = part[name][0]
     return joined
 

@@ -25,7 +25,7 @@ _COLUMNS: dict[str, tuple[tuple[str, str], ...]] = {
         ('direct_current', 'direct_current'),
         ('quadrature_current', 'quadrature_current'),
     ),
-    'controller': (('saturated', 'saturated'), ('mode', 'mode')),
+    'controller': (('saturated', 'saturated'), ('limited_by', 'limited_by'), ('mode', 'mode')),
     'plant': (('state', 'state'), ('thermal_load', 'thermal_load')),
 }
 
@@ -34,6 +34,7 @@ def _row_type() -> np.dtype[np.void]:
     columns: list[tuple[str, str] | tuple[str, str, tuple[int]]] = [
         ('sequence', '<i8'),
         ('stamp', '<i8'),
+        ('stage_time', '<i8'),
     ]
     for key, names in _COLUMNS.items():
         columns.append((f'has_{key}', '?'))
@@ -48,9 +49,12 @@ def _row_type() -> np.dtype[np.void]:
 
 
 ROW = _row_type()
-"""One joined sample: ``sequence``, ``stamp`` of the measurement by the wall clock [ns],
-``has_<topic>`` and the
-columns of each topic (all zero where the topic has no message for this sample)."""
+"""One joined sample.
+
+``sequence``; ``stamp`` and ``stage_time`` of the measurement, by the wall clock and by the stage's
+[ns], the same in bags from before the stage had one; ``has_<topic>`` and the columns of each topic
+(all zero where the topic has no message for this sample).
+"""
 
 
 _ON_ITS_WAY = 100  # a topic that is further behind than this has stopped [samples]
@@ -146,8 +150,11 @@ class Joiner:
         present = block[f'has_{key}']
         self.duplicates += int(np.count_nonzero(present[rows]))
         present[rows] = True
+        sent = records.dtype.names or ()
         if key == 'measurement':
-            timed = 'wall_time' in (records.dtype.names or ())
-            block['stamp'][rows] = records['wall_time'] if timed else stamps(records)
+            block['stage_time'][rows] = stamps(records)
+            wall_time = records['wall_time'] if 'wall_time' in sent else stamps(records)
+            block['stamp'][rows] = wall_time
         for column, source in _COLUMNS[key]:
-            block[column][rows] = records[source]
+            if source in sent:
+                block[column][rows] = records[source]

@@ -7,6 +7,7 @@ step). No ROS here.
 
 from __future__ import annotations
 
+import copy
 import itertools
 from typing import Any
 
@@ -17,11 +18,16 @@ from maglev_model.axes import AXES
 from maglev_model.phases import Phase
 from maglev_monitor.metrics.decoding import TOPIC_TYPES, Records
 from maglev_monitor.metrics.derived import SOURCES, phase_currents, positions
+from maglev_monitor.metrics.faults import Faults, Instant
+from maglev_monitor.metrics.holes import Holes
 from maglev_monitor.metrics.run_parameters import RunParameters
 from maglev_monitor.metrics.step_response import StepTracker
 from maglev_monitor.metrics.verdict import verdict
 
 FloatArray = NDArray[np.float64]
+
+LIMITS = {'current': 1, 'levitation': 2}
+"""What limits currents, as bits of ControllerState's ``limited_by``."""
 
 _OPTIONAL = ('controller', 'plant')  # a stage or controller may do without
 _TICK_RESOLUTION = 1e-6  # of the tick histogram [s]
@@ -40,7 +46,7 @@ class RunMetrics:
         self._expected = -1
         self._run_rows = 0
         self._seen = dict.fromkeys(TOPIC_TYPES, 0)
-        self._missing = dict.fromkeys(TOPIC_TYPES, 0)
+        self._holes = {key: Holes() for key in TOPIC_TYPES}
         self._last_reference = -1  # number of the last sample with one
         self._tracking = _Tracking()
         self._measured_samples = 0
@@ -50,8 +56,8 @@ class RunMetrics:
         self._step: StepTracker | None = None
         self._currents = _Currents(run.machine.pole_pitch)
         self._timing = _Timing()
-        self._faults: dict[str, tuple[int, str]] = {}
-        self._end_stamp: int | None = None
+        self._faults = Faults()
+        self._end: Instant | None = None
 
     @property
     def tick_histogram(self) -> NDArray[np.int64]:
@@ -74,7 +80,7 @@ class RunMetrics:
             self.started = True
             first = int(moving[0])
         else:
-            self._skip(int(block['sequence'][0]) - self._expected)
+            self._skip(int(block['sequence'][0]))
         ends = np.flatnonzero(phases[first:] == Phase.END)
         if len(ends):
             self.ended = True
@@ -83,16 +89,14 @@ class RunMetrics:
         if len(rows):
             self._add_rows(rows, phases[first:last])
         if self.ended:
-            at_end = block[last]
-            self._end_stamp = int(at_end['stamp']) or self._timing.last_stamp
+            at_end = Instant(int(block['stamp'][last]), int(block['stage_time'][last]))
+            self._end = at_end if at_end.wall else self._timing.latest
         self._expected = int(block['sequence'][-1]) + 1
         return rows
 
     def add_fault(self, stamp: int, node: str, message: str) -> None:
         """Take an error a node reported at a time [ns since the epoch]; its first counts."""
-        known = self._faults.get(node)
-        if known is None or stamp < known[0]:
-            self._faults[node] = (stamp, message)
+        self._faults.add(stamp, node, message)
 
     def result(self) -> dict[str, Any]:
         """The content of ``metrics.json``; complete only when the run has reached its end."""
@@ -111,28 +115,23 @@ class RunMetrics:
             'steps': [entry for step in self._steps for entry in step.results(source)],
             'currents': self._currents.result(),
             'timing': self._timing.result(sample_time),
-            'faults': self._fault_result(),
+            'faults': self._faults.until(self._end, sample_time),
         }
         return {**figures, **verdict(figures, run.limits, complete=self.ended)}
 
     def _missing_result(self) -> dict[str, Any]:
         """By topic; a landing after a reference that was ended is no loss of the reference."""
-        by_topic = {
-            key: count
-            for key, count in self._missing.items()
-            if self._seen[key] or key not in _OPTIONAL
-        }
+        holes = copy.deepcopy(self._holes)
         if self._seen['reference'] and not self.ended:
-            by_topic['reference'] -= self._expected - 1 - self._last_reference
-        return {'missing_samples': sum(by_topic.values()), 'missing_by_topic': by_topic}
-
-    def _fault_result(self) -> list[str]:
-        limit = self._end_stamp if self._end_stamp is not None else np.iinfo(np.int64).max
-        return [
-            f'{node}: {message}'
-            for node, (stamp, message) in sorted(self._faults.items())
-            if stamp <= limit
-        ]
+            holes['reference'].drop_from(self._last_reference + 1)
+        by_topic = {
+            key: found for key, found in holes.items() if self._seen[key] or key not in _OPTIONAL
+        }
+        return {
+            'missing_samples': sum(found.samples for found in by_topic.values()),
+            'missing_by_topic': {key: found.samples for key, found in by_topic.items()},
+            'holes': {key: found.result() for key, found in by_topic.items() if found.samples},
+        }
 
     def _phases(self, block: Records) -> NDArray[np.uint8]:
         """Phases of the rows; a row without reference has that of the row before it."""
@@ -142,17 +141,17 @@ class RunMetrics:
         self.phase = int(phases[-1])
         return phases
 
-    def _skip(self, rows: int) -> None:
-        self._run_rows += rows
-        for key in self._missing:
-            self._missing[key] += rows
+    def _skip(self, sequence: int) -> None:
+        self._run_rows += sequence - self._expected
+        for holes in self._holes.values():
+            holes.add_range(self._expected, sequence - 1)
 
     def _add_rows(self, rows: Records, phases: NDArray[np.uint8]) -> None:
         self._run_rows += len(rows)
         for key in TOPIC_TYPES:
-            present = int(np.count_nonzero(rows[f'has_{key}']))
-            self._seen[key] += present
-            self._missing[key] += len(rows) - present
+            present = rows[f'has_{key}']
+            self._seen[key] += int(np.count_nonzero(present))
+            self._holes[key].add(rows['sequence'][~present])
         position = positions(rows, self._run.machine.radius)
         referenced = rows['has_reference']
         if np.any(referenced):
@@ -238,11 +237,14 @@ class _Currents:
         self._squares = np.zeros(4)
         self._peak = 0.0
         self._saturated = 0
+        self._saturated_by = dict.fromkeys(LIMITS, 0)
         self._thermal_load = 0.0
 
     def add(self, rows: Records) -> None:
         driven = rows[rows['has_currents'] & rows['has_measurement']]
         self._saturated += int(np.count_nonzero(rows['saturated']))
+        for limit, bit in LIMITS.items():
+            self._saturated_by[limit] += int(np.count_nonzero(rows['limited_by'] & bit))
         self._thermal_load = float(max(self._thermal_load, rows['thermal_load'].max()))
         if not len(driven):
             return
@@ -257,18 +259,21 @@ class _Currents:
             'peak_phase': self._peak,
             'rms': np.sqrt(self._squares / max(self._count, 1)).tolist(),
             'saturated_samples': self._saturated,
+            'saturated_by': dict(self._saturated_by),
             'peak_thermal_load': self._thermal_load,
         }
 
 
 class _Timing:
-    """Wall-clock time from sample to sample, from the measurements' stamps."""
+    """Wall-clock time from sample to sample, as the stage gives it with its measurements."""
 
     def __init__(self) -> None:
         self.histogram = np.zeros(_TICK_BINS, np.int64)
         self._longest = 0
         self._first: tuple[int, int, int] | None = None  # sequence, stamp, late samples
         self._last: tuple[int, int, int] | None = None
+        self.latest: Instant | None = None
+        """When the last sample was measured."""
 
     def add(self, rows: Records) -> None:
         rows = rows[rows['has_measurement']]
@@ -289,11 +294,7 @@ class _Timing:
         ]
         self._first = self._first or ends[0]
         self._last = ends[1]
-
-    @property
-    def last_stamp(self) -> int | None:
-        """Stamp of the last measurement [ns]."""
-        return self._last[1] if self._last else None
+        self.latest = Instant(ends[1][1], int(rows['stage_time'][-1]))
 
     def result(self, sample_time: float) -> dict[str, Any]:
         first = self._first or (0, 0, 0)

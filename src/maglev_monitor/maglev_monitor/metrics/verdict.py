@@ -7,8 +7,10 @@ from typing import Any
 
 from maglev_model.axes import AXES
 from maglev_model.parameters import values
-from maglev_monitor.metrics.readable import angle_or_length, number
+from maglev_monitor.metrics.readable import angle_or_length, holes, number
 from maglev_monitor.metrics.run_parameters import RunLimits
+
+_MISSING = 'number of missing samples'
 
 
 def verdict(figures: Mapping[str, Any], limits: RunLimits, *, complete: bool) -> dict[str, Any]:
@@ -86,12 +88,13 @@ def _other_reasons(figures: Mapping[str, Any], limits: RunLimits) -> Iterator[st
     factor = figures['timing']['real_time_factor'] or 0.0
     upper = (
         ('peak phase current', figures['currents']['peak_phase'], limits.max_phase_current, ' A'),
-        ('number of missing samples', figures['missing_samples'], limits.max_missing_samples, ''),
+        (_MISSING, figures['missing_samples'], limits.max_missing_samples, ''),
         ('number of late samples', figures['timing']['late_samples'], limits.max_late_samples, ''),
     )
     for title, value, bound, unit in upper:
         if bound >= 0 and value > bound * (1.0 + 1e-9):
-            yield f'{title} is {number(value)}{unit}, allowed is {number(bound)}{unit}'
+            where = f': {holes(figures["holes"])}' if title == _MISSING else ''
+            yield f'{title} is {number(value)}{unit}, allowed is {number(bound)}{unit}{where}'
     lower = (
         ('real-time factor', factor, limits.min_real_time_factor),
         ('number of measured samples', figures['samples'], limits.min_samples),

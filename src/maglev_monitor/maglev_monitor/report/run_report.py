@@ -8,7 +8,14 @@ from typing import Any
 
 from maglev_model.axes import AXES
 from maglev_monitor.bag.analysis import Analysis
-from maglev_monitor.metrics.readable import angle_or_length, micro, number, seconds
+from maglev_monitor.metrics.readable import (
+    angle_or_length,
+    holes,
+    micro,
+    number,
+    saturation,
+    seconds,
+)
 from maglev_monitor.report.page import bullets, header, html_table, page, picture, write_page
 from maglev_monitor.report.run_plots import plots
 
@@ -26,6 +33,7 @@ def render(analysis: Analysis) -> str:
         _header(result, name),
         bullets('Why', result['reasons']),
         bullets('The bag', analysis.notes),
+        bullets('Missing samples', [holes({key: hole}) for key, hole in result['holes'].items()]),
         _cards(result),
         _tracking_table(result),
         _step_table(result),
@@ -54,7 +62,7 @@ def _cards(result: Mapping[str, Any]) -> str:
         (number(timing['late_samples']), 'late samples'),
         (number(result['missing_samples']), 'missing samples'),
         (f'{currents["peak_phase"]:.2f} A', 'peak phase current'),
-        (number(currents['saturated_samples']), 'saturated samples'),
+        (number(currents['saturated_samples']), saturation(currents).partition(' ')[2]),
     ]
     inner = ''.join(
         f'<div class="card"><b>{value}</b><span>{name}</span></div>' for value, name in cards

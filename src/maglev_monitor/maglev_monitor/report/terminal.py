@@ -6,7 +6,14 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from maglev_model.axes import AXES
-from maglev_monitor.metrics.readable import angle_or_length, micro, number, seconds
+from maglev_monitor.metrics.readable import (
+    angle_or_length,
+    holes,
+    micro,
+    number,
+    saturation,
+    seconds,
+)
 
 
 def as_text(figures: Mapping[str, Any]) -> str:
@@ -17,7 +24,10 @@ def as_text(figures: Mapping[str, Any]) -> str:
         *_step_lines(figures),
         *_other_lines(figures),
     ]
-    lines.append(f'verdict: {figures["verdict"]}')
+    word = f'verdict: {figures["verdict"]}'
+    if figures['currents']['saturated_samples']:
+        word += f', {saturation(figures["currents"])}'
+    lines.append(word)
     lines += [f'  {reason}' for reason in figures['reasons']]
     return '\n'.join(lines)
 
@@ -73,3 +83,5 @@ def _other_lines(figures: Mapping[str, Any]) -> Iterator[str]:
         f'{count} {key}' for key, count in figures['missing_by_topic'].items() if count
     )
     yield f'  missing samples: {figures["missing_samples"]}' + (f' ({missing})' if missing else '')
+    if missing:
+        yield f'  {holes(figures["holes"])}'
