@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import time
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import SetBool, Trigger
@@ -66,6 +66,16 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
     In lockstep the answer waits for the reference of its sample, without limit for the very first,
     so that a run begins when everything is there and is the same every time.
     """
+
+    interface: ClassVar[Mapping[str, str]] = {
+        MEASUREMENT: 'subscribed: what the encoders read, each sample',
+        REFERENCE: 'subscribed: where the platen shall be, ahead of time',
+        CURRENTS: 'published: the currents that answer a sample',
+        CONTROLLER_STATE: 'published: mode, errors and internal models of each sample',
+        '~/enable': 'std_srvs/SetBool: follow the reference; false: land',
+        '~/emergency_stop': 'std_srvs/Trigger: no current, at once',
+        '~/reset': 'std_srvs/Trigger: clear a fault',
+    }
 
     def __init__(self) -> None:
         super().__init__('controller', ControllerNodeParameters)

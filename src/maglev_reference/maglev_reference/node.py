@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import time
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -83,6 +83,14 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
     first measurement seen once all watchers are there tells where the platen rests and becomes
     sample 0 of the timeline. In lockstep, which waits for it, it is slow while nothing shall move.
     """
+
+    interface: ClassVar[Mapping[str, str]] = {
+        REFERENCE: 'published: where the platen shall be, ahead of time',
+        MEASUREMENT: 'subscribed: what the encoders read, the newest',
+        CONTROLLER_STATE: 'subscribed: whether the controller follows, the newest',
+        '~/lift_off': 'std_srvs/Trigger: start from rest',
+        '~/land': 'std_srvs/Trigger: land from wherever the platen is',
+    }
 
     def __init__(self) -> None:
         super().__init__('reference', ReferenceNodeParameters)

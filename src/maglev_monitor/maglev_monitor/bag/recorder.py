@@ -6,6 +6,7 @@ import dataclasses
 import time
 from collections.abc import Mapping
 from pathlib import Path
+from typing import ClassVar
 
 from ament_index_python.packages import get_package_share_directory
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -62,6 +63,8 @@ class RecorderParameters(NodeParameters):
 
 class RecorderNode(MaglevNode[RecorderParameters]):
     """Takes the raw messages of all topics in bursts and writes them to a bag."""
+
+    interface: ClassVar[Mapping[str, str]] = dict.fromkeys(TOPICS, 'subscribed: each message')
 
     def __init__(self) -> None:
         super().__init__('recorder', RecorderParameters)
@@ -163,3 +166,7 @@ def _bag_time(nanoseconds: int) -> QosTime:
 def main() -> None:
     """Entry point of the executable."""
     run_main(RecorderNode, 'recorder', background=True)
+
+
+if __name__ == '__main__':
+    main()

@@ -6,7 +6,7 @@ import dataclasses
 import time
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
@@ -47,6 +47,8 @@ class MonitorParameters(NodeParameters, WatchParameters):
 
 class MonitorNode(MaglevNode[MonitorParameters]):
     """Takes the samples of all topics in bursts; polls, so that the loop keeps the cores."""
+
+    interface: ClassVar[Mapping[str, str]] = dict.fromkeys(KEYS, 'subscribed: each sample')
 
     def __init__(self) -> None:
         super().__init__('monitor', MonitorParameters)
@@ -175,3 +177,7 @@ class MonitorNode(MaglevNode[MonitorParameters]):
 def main() -> None:
     """Entry point of the executable."""
     run_main(MonitorNode, 'monitor', background=True)
+
+
+if __name__ == '__main__':
+    main()
