@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 
 import pytest
+from flight import WATCHED
 from graph import Nodes, Observer
 
 from maglev_msgs.msg import Reference
@@ -21,11 +22,11 @@ def test_land_swap_lift_off(nodes: Nodes, observer: Observer) -> None:
     def flights() -> int:
         return reference.output.count('END at sample')
 
-    plant = nodes.start('plant', 'watchers:=1', params=('benchmark.yaml',))
-    controller = nodes.start('controller', 'watchers:=1')
+    plant = nodes.start('plant', WATCHED, params=('benchmark.yaml',))
+    controller = nodes.start('controller', WATCHED)
     reference = nodes.start(
         'reference',
-        'watchers:=1',
+        WATCHED,
         'autostart:=false',
         'duration:=600.0',
         params=('scenario_ellipse.yaml',),
@@ -39,7 +40,7 @@ def test_land_swap_lift_off(nodes: Nodes, observer: Observer) -> None:
     assert plant.wait() == 0
 
     count = len(observer.look()[TRUE_STATE])
-    bridge = nodes.start('hw_bridge', 'watchers:=1', params=('hw_bridge.yaml',))
+    bridge = nodes.start('hw_bridge', WATCHED, params=('hw_bridge.yaml',))
     observer.wait(lambda: len(observer.look()[TRUE_STATE]) > count + 200)
     observer.wait(lambda: observer.newest(REFERENCE).phase == Reference.REST)
     assert observer.call('/reference/lift_off').success
