@@ -17,9 +17,9 @@ from maglev_node import ros_parameters
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Table:
-    first: float = parameter(1.0, description='a number')
-    second: float = parameter(1.0, description='another')
-    names: tuple[str, ...] = parameter((), description='some names')
+    first: float = parameter(1.0, 'a number')
+    second: float = parameter(1.0, 'another')
+    names: tuple[str, ...] = parameter((), 'some names')
 
 
 FILE = """

@@ -41,22 +41,18 @@ _SILENCE = 0.5  # without a sample for this long the stage is taken for stopped 
 class ControllerNodeParameters(SourceParameters, ControllerParameters):
     """The regulator and how its node runs it."""
 
-    enabled: bool = parameter(
-        True, description='follow the reference from the start; false: after ~/enable'
-    )
+    enabled: bool = parameter(True, 'follow the reference from the start; false: after ~/enable')
     reference_timeout: float = parameter(
         2.0,
+        'lockstep: longest wait for a reference in flight, wall clock; then it lands',
         unit='s',
-        lower=0.1,
-        upper=600.0,
-        description='lockstep: longest wait for a reference in flight, wall clock; then it lands',
+        within=(0.1, 600.0),
     )
     measurement_timeout: float = parameter(
         0.02,
+        'a longer gap between measurements, in stage time, is a fault in flight',
         unit='s',
-        lower=0.001,
-        upper=1.0,
-        description='a longer gap between measurements, in stage time, is a fault in flight',
+        within=(0.001, 1.0),
     )
 
 

@@ -37,9 +37,7 @@ class NodeParameters:
     """What every node takes."""
 
     effective_parameters: str = parameter(
-        '',
-        description='file to write the parameters in effect to; empty: none',
-        read_only=True,
+        '', 'file to write the parameters in effect to; empty: none', read_only=True
     )
 
 
@@ -49,20 +47,19 @@ class SourceParameters(NodeParameters):
 
     mode: str = parameter(
         'lockstep',
+        'lockstep: each sample waits for its answer; realtime: by the clock',
         choices=('lockstep', 'realtime'),
-        description='lockstep: each sample waits for its answer; realtime: by the clock',
         read_only=True,
     )
     realtime_priority: int = parameter(
         40,
-        lower=0,
-        upper=98,
-        description='realtime: SCHED_FIFO priority of the process, where permitted; 0: none',
+        'realtime: SCHED_FIFO priority of the process, where permitted; 0: none',
+        within=(0, 98),
         read_only=True,
     )
     watchers: tuple[str, ...] = parameter(
         (),
-        description='names of nodes in this namespace that watch every sample, waited for at start',
+        'names of nodes in this namespace that watch every sample, waited for at start',
         read_only=True,
     )
 

@@ -44,34 +44,27 @@ _NEWS_TIME = 0.2  # in which an answer shows what a call has changed in the cont
 class ReferenceNodeParameters(SourceParameters, ReferenceParameters):
     """The reference and how it is published."""
 
-    autostart: bool = parameter(
-        True, description='start by itself; false: by ~/lift_off', read_only=True
-    )
-    exit_at_end: bool = parameter(
-        False, description='end the process when the run is over', read_only=True
-    )
+    autostart: bool = parameter(True, 'start by itself; false: by ~/lift_off', read_only=True)
+    exit_at_end: bool = parameter(False, 'end the process when the run is over', read_only=True)
     lead: int = parameter(
         64,
-        description='how far the reference is published ahead',
+        'how far the reference is published ahead',
         unit='samples',
-        lower=1,
-        upper=200,
+        within=(1, 200),
         read_only=True,
     )
     poll_period: float = parameter(
         0.004,
-        description='how often the newest measurement is looked at, wall clock',
+        'how often the newest measurement is looked at, wall clock',
         unit='s',
-        lower=0.0005,
-        upper=0.1,
+        within=(0.0005, 0.1),
         read_only=True,
     )
     timeout: float = parameter(
         1.0,
-        description='longest time without a measurement while running, wall clock',
+        'longest time without a measurement while running, wall clock',
         unit='s',
-        lower=0.05,
-        upper=600.0,
+        within=(0.05, 600.0),
         read_only=True,
     )
 
