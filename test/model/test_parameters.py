@@ -16,18 +16,18 @@ from maglev_model.parameters import ParameterError, group, parameter
 
 @dataclass(frozen=True, kw_only=True)
 class Magnet:
-    height: float = parameter(0.005, unit='m', lower=0.001, upper=0.1, description='height')
-    grade: str = parameter('N35', choices=('N35', 'N52'), description='grade')
+    height: float = parameter(0.005, 'height', unit='m', within=(0.001, 0.1))
+    grade: str = parameter('N35', 'grade', choices=('N35', 'N52'))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Table:
     magnet: Magnet = group(Magnet)
-    pairs: int = parameter(3, lower=1, upper=10, description='pole pairs')
-    gains: tuple[float, ...] = parameter((1.0, 2.0), lower=-9.0, upper=9.0, description='gains')
-    fixed: tuple[float, ...] = parameter((0.0,) * 3, length=3, description='three numbers')
-    names: tuple[str, ...] = parameter(('y',), description='axes')
-    on: bool = parameter(True, description='a switch')
+    pairs: int = parameter(3, 'pole pairs', within=(1, 10))
+    gains: tuple[float, ...] = parameter((1.0, 2.0), 'gains', within=(-9.0, 9.0))
+    fixed: tuple[float, ...] = parameter((0.0,) * 3, 'three numbers', length=3)
+    names: tuple[str, ...] = parameter(('y',), 'axes')
+    on: bool = parameter(True, 'a switch')
 
 
 def test_defaults_and_overrides() -> None:
@@ -65,7 +65,7 @@ def test_what_is_refused_is_named(name: str, value: object, said: str) -> None:
 def test_a_required_parameter_must_be_given() -> None:
     @dataclass(frozen=True, kw_only=True)
     class Required:
-        mass: float = parameter(unit='kg', description='mass')
+        mass: float = parameter(description='mass', unit='kg')
 
     with pytest.raises(ParameterError, match="'mass' has no default"):
         parameters.build(Required)
@@ -101,8 +101,8 @@ def test_yaml_carries_every_value_unchanged(
 def test_yaml_has_no_empty_list_by_default_as_ros_cannot_read_one() -> None:
     @dataclass(frozen=True, kw_only=True)
     class Poles:
-        real: tuple[float, ...] = parameter((), description='poles')
-        others: tuple[float, ...] = parameter((1.0,), description='others')
+        real: tuple[float, ...] = parameter((), 'poles')
+        others: tuple[float, ...] = parameter((1.0,), 'others')
 
     assert 'real' not in parameters.to_yaml(Poles(), 'controller')
     assert 'real: [2.0]' in parameters.to_yaml(Poles(real=(2.0,)), 'controller')

@@ -20,7 +20,14 @@ from maglev_node.node import MaglevNode, SourceParameters
 from maglev_node.polling import Queues
 from maglev_node.process import main as run_main
 from maglev_node.stamp import copy_stamp, stamp_now
-from maglev_node.topics import CONTROLLER_STATE, CURRENTS, MEASUREMENT, REFERENCE, sample_qos
+from maglev_node.topics import (
+    CONTROLLER_STATE,
+    CURRENTS,
+    MEASUREMENT,
+    REFERENCE,
+    reference_qos,
+    sample_qos,
+)
 
 _REFERENCE_PERIOD = 2e-3  # between two looks at what references have arrived [s]
 _HAND_PERIOD = 2e-4  # between two looks at the queues during a redesign [s]
@@ -31,22 +38,18 @@ _SILENCE = 0.5  # without a sample for this long the stage is taken for stopped 
 class ControllerNodeParameters(SourceParameters, ControllerParameters):
     """The regulator and how its node runs it."""
 
-    enabled: bool = parameter(
-        True, description='follow the reference from the start; false: after ~/enable'
-    )
+    enabled: bool = parameter(True, 'follow the reference from the start; false: after ~/enable')
     reference_timeout: float = parameter(
         2.0,
+        'lockstep: longest wait for a reference in flight, wall clock; then it lands',
         unit='s',
-        lower=0.1,
-        upper=600.0,
-        description='lockstep: longest wait for a reference in flight, wall clock; then it lands',
+        within=(0.1, 600.0),
     )
     measurement_timeout: float = parameter(
         0.02,
+        'a longer gap between measurements, in stage time, is a fault in flight',
         unit='s',
-        lower=0.001,
-        upper=1.0,
-        description='a longer gap between measurements, in stage time, is a fault in flight',
+        within=(0.001, 1.0),
     )
 
 
@@ -75,7 +78,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
             ControllerState, CONTROLLER_STATE, sample_qos()
         )
         self._queues = Queues(self)
-        self._references = self._queues.subscribe(REFERENCE, Reference)
+        self._references = self._queues.subscribe(REFERENCE, Reference, reference_qos())
         self._measurements = self.create_subscription(
             Measurement, MEASUREMENT, self._on_measurement, sample_qos()
         )

@@ -17,53 +17,38 @@ class AxisParameters(AxisLoopParameters):
     """Internal model and gains of one axis."""
 
     controlled: bool = parameter(
-        True,
-        description='whether the axis gets control; off: v_phi = v_theta = 0 as in the paper',
+        True, 'whether the axis gets control; off: v_phi = v_theta = 0 as in the paper'
     )
     design: str = parameter(
         'bandwidth',
+        'gains by discrete LQR with the weights that bandwidth, integration and learning '
+        'stand for; by LQR with the weights weight_*; or from closed-loop poles',
         choices=('bandwidth', 'lqr_discrete', 'lqr_continuous', 'poles'),
-        description='gains by discrete LQR with the weights that bandwidth, integration and '
-        'learning stand for; by LQR with the weights weight_*; or from closed-loop poles',
     )
     poles_real: tuple[float, ...] = parameter(
         (),
+        'real parts of the closed-loop poles, for the design poles',
         unit='rad/s',
-        lower=-1e5,
-        upper=0.0,
-        description='real parts of the closed-loop poles, for the design poles',
+        within=(-1e5, 0.0),
     )
     poles_imaginary: tuple[float, ...] = parameter(
-        (),
-        unit='rad/s',
-        lower=-1e5,
-        upper=1e5,
-        description='their imaginary parts, in the same order',
+        (), 'their imaginary parts, in the same order', unit='rad/s', within=(-1e5, 1e5)
     )
     weight_error: float = parameter(
-        0.0,
-        lower=0.0,
-        upper=1e15,
-        description='LQR weight on e^2, for the designs lqr_* [1/m^2 or 1/rad^2]',
+        0.0, 'LQR weight on e^2, for the designs lqr_* [1/m^2 or 1/rad^2]', within=(0.0, 1e15)
     )
-    weight_rate: float = parameter(
-        0.0, lower=0.0, upper=1e15, description='LQR weight on the error rate squared'
-    )
+    weight_rate: float = parameter(0.0, 'LQR weight on the error rate squared', within=(0.0, 1e15))
     weight_model: tuple[float, ...] = parameter(
         (),
-        lower=0.0,
-        upper=1e18,
-        description='LQR weight on the internal-model states: one for all; or of the integrator '
-        'and of the oscillators; or one per frequency (companion form: per state)',
+        'LQR weight on the internal-model states: one for all; or of the integrator and of '
+        'the oscillators; or one per frequency (companion form: per state)',
+        within=(0.0, 1e18),
     )
-    weight_effort: float = parameter(
-        1.0, lower=1e-15, upper=1e15, description='LQR weight on w^2, R'
-    )
+    weight_effort: float = parameter(1.0, 'LQR weight on w^2, R', within=(1e-15, 1e15))
     antiwindup: tuple[float, ...] = parameter(
         (0.0,),
-        lower=-1e3,
-        upper=1e3,
-        description='E of (17) [1/A], one for all internal-model states or one for each',
+        'E of (17) [1/A], one for all internal-model states or one for each',
+        within=(-1e3, 1e3),
     )
 
 
@@ -73,35 +58,33 @@ class RegulatorModelParameters(FundamentalParameters):
 
     form: str = parameter(
         'modal',
+        'realisation: companion is (15) to the letter, modal is for many frequencies',
         choices=('modal', 'companion'),
-        description='realisation: companion is (15) to the letter, modal is for many frequencies',
     )
     friction_slope: float = parameter(
         1500.0,
+        'steepest friction against velocity that standing still stays stable with: phases '
+        'the oscillators of LQR designs, and is checked; 0: not',
         unit='1/s',
-        lower=0.0,
-        upper=1e6,
-        description='steepest friction against velocity that standing still stays stable with: '
-        'phases the oscillators of LQR designs, and is checked; 0: not',
+        within=(0.0, 1e6),
     )
     largest_error: tuple[float, ...] = parameter(
         (1e-4, 1e-4, 1e-4, 2e-4, 2e-4),
+        'an internal model learns from errors up to this, per axis',
         unit='m, rad',
-        lower=1e-6,
-        upper=1.0,
+        within=(1e-6, 1.0),
         length=5,
-        description='an internal model learns from errors up to this, per axis',
     )
     restart_at_step: bool = parameter(
-        False, description='begin every measured step as at enable, with internal models at rest'
+        False, 'begin every measured step as at enable, with internal models at rest'
     )
     antiwindup: str = parameter(
         'observer',
+        "paper: (17) with the axes' E; observer: every axis follows what was realised",
         choices=('none', 'paper', 'observer'),
-        description="paper: (17) with the axes' E; observer: every axis follows what was realised",
     )
     antiwindup_speed: float = parameter(
-        30.0, unit='rad/s', lower=1e-3, upper=1e3, description='how fast it follows (observer)'
+        30.0, 'how fast it follows (observer)', unit='rad/s', within=(1e-3, 1e3)
     )
 
 
@@ -111,37 +94,25 @@ class CompensatorParameters:
 
     crossover: tuple[float, ...] = parameter(
         (300.0, 300.0, 300.0, 300.0, 300.0),
+        'bandwidth: where the loop gain crosses 1, per axis',
         unit='rad/s',
-        lower=1.0,
-        upper=1e5,
+        within=(1.0, 1e5),
         length=5,
-        description='bandwidth: where the loop gain crosses 1, per axis',
     )
     phase_margin: float = parameter(
-        45.0,
-        unit='deg',
-        lower=5.0,
-        upper=85.0,
-        description='phase margin there, sampling included',
+        45.0, 'phase margin there, sampling included', unit='deg', within=(5.0, 85.0)
     )
-    lag: float = parameter(
-        10.0,
-        lower=2.0,
-        upper=1000.0,
-        description='the integral acts below crossover / lag',
-    )
+    lag: float = parameter(10.0, 'the integral acts below crossover / lag', within=(2.0, 1000.0))
     roll_off: float = parameter(
         8.0,
-        lower=1.5,
-        upper=100.0,
-        description='the second-order roll-off acts above crossover * roll_off (feedback_soi)',
+        'the second-order roll-off acts above crossover * roll_off (feedback_soi)',
+        within=(1.5, 100.0),
     )
     equilibrium: float = parameter(
         0.025,
+        'air gap of the equilibrium that is linearised about (jacobian_lead_lag)',
         unit='m',
-        lower=1e-3,
-        upper=0.2,
-        description='air gap of the equilibrium that is linearised about (jacobian_lead_lag)',
+        within=(1e-3, 0.2),
     )
 
 
@@ -149,12 +120,8 @@ class CompensatorParameters:
 class DerivativeParameters:
     """The filter s a / (s + a) that estimates rates."""
 
-    bandwidth: float = parameter(
-        1000.0, unit='rad/s', lower=1.0, upper=1e5, description='bandwidth a'
-    )
-    discretisation: str = parameter(
-        'tustin', choices=('tustin', 'matched'), description='how it is sampled'
-    )
+    bandwidth: float = parameter(1000.0, 'bandwidth a', unit='rad/s', within=(1.0, 1e5))
+    discretisation: str = parameter('tustin', 'how it is sampled', choices=('tustin', 'matched'))
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -163,10 +130,9 @@ class ObserverParameters:
 
     bandwidth: float = parameter(
         800.0,
+        'where it turns from believing its prediction to believing the encoders',
         unit='rad/s',
-        lower=1.0,
-        upper=1e5,
-        description='where it turns from believing its prediction to believing the encoders',
+        within=(1.0, 1e5),
     )
 
 
@@ -174,20 +140,13 @@ class ObserverParameters:
 class MarginParameters:
     """What the sampled closed loop of every axis must have at least, or is refused."""
 
-    phase: float = parameter(
-        20.0, unit='deg', lower=0.0, upper=90.0, description='phase margin at least'
-    )
+    phase: float = parameter(20.0, 'phase margin at least', unit='deg', within=(0.0, 90.0))
     gain: float = parameter(
-        1.5,
-        lower=1.0,
-        upper=100.0,
-        description='gain margin at least, as a factor, up and down',
+        1.5, 'gain margin at least, as a factor, up and down', within=(1.0, 100.0)
     )
-    sensitivity: float = parameter(
-        3.5, lower=1.0, upper=1e3, description='sensitivity peak at most'
-    )
+    sensitivity: float = parameter(3.5, 'sensitivity peak at most', within=(1.0, 1e3))
     override: bool = parameter(
-        False, description='take a loop that is stable without these margins all the same'
+        False, 'take a loop that is stable without these margins all the same'
     )
 
 
@@ -197,18 +156,16 @@ class JumpParameters:
 
     duration: float = parameter(
         0.2,
+        'time in which the controller itself rounds off a jump; 0 = does not',
         unit='s',
-        lower=0.0,
-        upper=10.0,
-        description='time in which the controller itself rounds off a jump; 0 = does not',
+        within=(0.0, 10.0),
     )
     acceleration: tuple[float, ...] = parameter(
         (5.5, 5.5, 5.5, 20.0, 20.0),
+        'largest acceleration for that, per axis; a longer way takes more time',
         unit='m/s^2, rad/s^2',
-        lower=1e-3,
-        upper=1e3,
+        within=(1e-3, 1e3),
         length=5,
-        description='largest acceleration for that, per axis; a longer way takes more time',
     )
 
 
@@ -218,28 +175,25 @@ class LimitParameters:
 
     current: float = parameter(
         7.0,
+        'largest phase-current amplitude of a motor; sat_7 of (17)',
         unit='A',
-        lower=0.1,
-        upper=50.0,
-        description='largest phase-current amplitude of a motor; sat_7 of (17)',
+        within=(0.1, 50.0),
     )
     error: tuple[float, ...] = parameter(
         (5e-4, 5e-4, 5e-4, 1.5e-3, 1.5e-3),
+        'error that is fed back at most, per axis; a larger one is approached at a speed '
+        'that the currents can brake',
         unit='m, rad',
-        lower=1e-5,
-        upper=1.0,
+        within=(1e-5, 1.0),
         length=5,
-        description='error that is fed back at most, per axis; a larger one is approached at a '
-        'speed that the currents can brake',
     )
     levitation_first: bool = parameter(
-        True, description='i_q yields to the i_d that carries the platen (exact inverse only)'
+        True, 'i_q yields to the i_d that carries the platen (exact inverse only)'
     )
     least_attraction: float = parameter(
         0.1,
-        lower=0.0,
-        upper=0.9,
-        description='share of the weight carried however fast y shall fall (exact inverse)',
+        'share of the weight carried however fast y shall fall (exact inverse)',
+        within=(0.0, 0.9),
     )
 
 
@@ -248,18 +202,13 @@ class MeasurementParameters:
     """What a measurement must fulfil to be believed."""
 
     margin: float = parameter(
-        5e-4,
-        unit='m',
-        lower=0.0,
-        upper=0.1,
-        description='how far beyond the stops gap, x and z may read',
+        5e-4, 'how far beyond the stops gap, x and z may read', unit='m', within=(0.0, 0.1)
     )
     warp: float = parameter(
         5e-4,
+        'largest |g1 + g3 - g2 - g4|, which is 0 for a rigid platen',
         unit='m',
-        lower=1e-6,
-        upper=0.1,
-        description='largest |g1 + g3 - g2 - g4|, which is 0 for a rigid platen',
+        within=(1e-6, 0.1),
     )
 
 
@@ -268,17 +217,13 @@ class OwnLandingParameters:
     """The descent the controller makes by itself when the reference is lost."""
 
     braking_time: float = parameter(
-        0.4, unit='s', lower=0.05, upper=10.0, description='time to stop, and to level the tilts'
+        0.4, 'time to stop, and to level the tilts', unit='s', within=(0.05, 10.0)
     )
     descent_time: float = parameter(
-        1.5, unit='s', lower=0.1, upper=60.0, description='time to descend to the lower stop'
+        1.5, 'time to descend to the lower stop', unit='s', within=(0.1, 60.0)
     )
     settle_time: float = parameter(
-        0.5,
-        unit='s',
-        lower=0.0,
-        upper=10.0,
-        description='time held on the stop before the current ends',
+        0.5, 'time held on the stop before the current ends', unit='s', within=(0.0, 10.0)
     )
 
 
@@ -287,32 +232,31 @@ class ControllerParameters:
     """All parameters of the regulator. Axes in the paper's output order y, x, z, phi, theta."""
 
     sample_time: float = parameter(
-        1e-3, unit='s', lower=1e-5, upper=0.1, description='sample time', read_only=True
+        1e-3, 'sample time', unit='s', within=(1e-5, 0.1), read_only=True
     )
     law: str = parameter(
         'output_regulator',
-        description='control law, how e becomes w: a module of maglev_controller.laws by its name, '
-        'or any other by its dotted path',
+        'control law, how e becomes w: a module of maglev_controller.laws by its name, or '
+        'any other by its dotted path',
     )
     inverse: str = parameter(
         'exact',
+        "simplified: the paper's (8), (12); exact: per motor through the quadratic (2); "
+        'equilibrium: constant gains, by linearisation (jacobian_lead_lag)',
         choices=('exact', 'simplified', 'equilibrium'),
-        description="simplified: the paper's (8), (12); exact: per motor through the quadratic (2);"
-        ' equilibrium: constant gains, by linearisation (jacobian_lead_lag)',
     )
-    feed_forward: bool = parameter(True, description='add the acceleration of the reference to w')
+    feed_forward: bool = parameter(True, 'add the acceleration of the reference to w')
     internal_model: RegulatorModelParameters = group(RegulatorModelParameters)
     compensator: CompensatorParameters = group(CompensatorParameters)
     rate_estimate: str = parameter(
         'observer',
+        'where rates come from: the observer, or the derivative filter',
         choices=('observer', 'derivative'),
-        description='where rates come from: the observer, or the derivative filter',
     )
     input_delay: int = parameter(
         0,
-        lower=0,
-        upper=1,
-        description='samples by which the currents come late; design and margins count with them',
+        'samples by which the currents come late; design and margins count with them',
+        within=(0, 1),
     )
     observer: ObserverParameters = group(ObserverParameters)
     derivative: DerivativeParameters = group(DerivativeParameters)

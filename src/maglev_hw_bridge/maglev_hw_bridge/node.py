@@ -26,9 +26,7 @@ class BridgeNodeParameters(StageNodeParameters, BridgeParameters):
     """The bridge and how its node runs it."""
 
     autostart: bool = parameter(
-        False,
-        description='configure and activate by itself; false: by the life-cycle services',
-        read_only=True,
+        False, 'configure and activate by itself; false: by the life-cycle services', read_only=True
     )
 
 

@@ -24,81 +24,71 @@ class FaultParameters:
 
     stale: float = parameter(
         0.005,
+        'without fresh currents for this long in flight the bridge lands by itself',
         unit='s',
-        lower=0.001,
-        upper=1.0,
-        description='without fresh currents for this long in flight the bridge lands by itself',
+        within=(0.001, 1.0),
     )
     command_limit: float = parameter(
         10.5,
+        "largest commanded amplitude of a motor's dq current; more is a fault",
         unit='A',
-        lower=0.1,
-        upper=200.0,
-        description="largest commanded amplitude of a motor's dq current; more is a fault",
+        within=(0.1, 200.0),
     )
     over_current: float = parameter(
         10.5,
+        'largest phase current that may be asked for before limits; more is a fault',
         unit='A',
-        lower=0.1,
-        upper=200.0,
-        description='largest phase current that may be asked for before limits; more is a fault',
+        within=(0.1, 200.0),
     )
     jump: float = parameter(
         3e-4,
+        'largest change of an encoder from one sample to what the two before foretell',
         unit='m',
-        lower=1e-6,
-        upper=0.1,
-        description='largest change of an encoder from one sample to what the two before foretell',
+        within=(1e-6, 0.1),
     )
     residual: float = parameter(
         2e-4,
+        'largest |g1 + g3 - g2 - g4|, which is 0 for a rigid platen',
         unit='m',
-        lower=1e-6,
-        upper=0.1,
-        description='largest |g1 + g3 - g2 - g4|, which is 0 for a rigid platen',
+        within=(1e-6, 0.1),
     )
     stuck_gap: float = parameter(
         1e-4,
+        'a gap encoder is stuck when the other three see it move this far meanwhile',
         unit='m',
-        lower=1e-6,
-        upper=0.1,
-        description='a gap encoder is stuck when the other three see it move this far meanwhile',
+        within=(1e-6, 0.1),
     )
     stuck_horizontal: float = parameter(
         3e-4,
+        'x or z is stuck when the force should have moved it this far meanwhile',
         unit='m',
-        lower=1e-6,
-        upper=0.1,
-        description='x or z is stuck when the force should have moved it this far meanwhile',
+        within=(1e-6, 0.1),
     )
     friction: float = parameter(
         0.5,
+        'deceleration that guide friction along X and Z stays below',
         unit='m/s^2',
-        lower=0.0,
-        upper=100.0,
-        description='deceleration that guide friction along X and Z stays below',
+        within=(0.0, 100.0),
     )
     lower: tuple[float, ...] = parameter(
         (0.0183, -0.048, -0.048, -0.0028, -0.0135),
+        'least position in flight' + _BY_AXIS,
         unit='m, rad',
-        lower=-1.0,
-        upper=1.0,
+        within=(-1.0, 1.0),
         length=5,
-        description='least position in flight' + _BY_AXIS,
     )
     upper: tuple[float, ...] = parameter(
         (0.0313, 0.048, 0.048, 0.0028, 0.0135),
+        'greatest position in flight' + _BY_AXIS,
         unit='m, rad',
-        lower=-1.0,
-        upper=1.0,
+        within=(-1.0, 1.0),
         length=5,
-        description='greatest position in flight' + _BY_AXIS,
     )
     gap_lower: float = parameter(
-        0.0176, unit='m', lower=1e-3, upper=0.2, description='least gap of a motor in flight'
+        0.0176, 'least gap of a motor in flight', unit='m', within=(1e-3, 0.2)
     )
     gap_upper: float = parameter(
-        0.0320, unit='m', lower=1e-3, upper=0.2, description='greatest gap of a motor in flight'
+        0.0320, 'greatest gap of a motor in flight', unit='m', within=(1e-3, 0.2)
     )
 
     def __post_init__(self) -> None:
@@ -118,55 +108,46 @@ class BridgeLandingParameters:
     """How the bridge lands the platen without a controller."""
 
     braking_time: float = parameter(
-        0.3, unit='s', lower=0.05, upper=10.0, description='time to stop and level the tilts'
+        0.3, 'time to stop and level the tilts', unit='s', within=(0.05, 10.0)
     )
     descent_time: float = parameter(
-        1.0, unit='s', lower=0.1, upper=60.0, description='time to descend to the lower stop'
+        1.0, 'time to descend to the lower stop', unit='s', within=(0.1, 60.0)
     )
     settle_time: float = parameter(
-        0.2, unit='s', lower=0.0, upper=10.0, description='time pressed on the stop before the end'
+        0.2, 'time pressed on the stop before the end', unit='s', within=(0.0, 10.0)
     )
     depth: float = parameter(
         5e-4,
+        'how far below the stop the descent aims, to arrive whatever the model says',
         unit='m',
-        lower=0.0,
-        upper=5e-3,
-        description='how far below the stop the descent aims, to arrive whatever the model says',
+        within=(0.0, 5e-3),
     )
     stiffness: tuple[float, ...] = parameter(
         (6400.0, 2500.0, 2500.0, 6400.0, 6400.0),
+        'acceleration per error' + _BY_AXIS,
         unit='1/s^2',
-        lower=1.0,
-        upper=1e6,
+        within=(1.0, 1e6),
         length=5,
-        description='acceleration per error' + _BY_AXIS,
     )
     damping: tuple[float, ...] = parameter(
         (160.0, 100.0, 100.0, 160.0, 160.0),
+        'acceleration per error rate' + _BY_AXIS,
         unit='1/s',
-        lower=0.1,
-        upper=1e4,
+        within=(0.1, 1e4),
         length=5,
-        description='acceleration per error rate' + _BY_AXIS,
     )
     rate_bandwidth: float = parameter(
-        800.0, unit='rad/s', lower=10.0, upper=2000.0, description='bandwidth of the rate estimate'
+        800.0, 'bandwidth of the rate estimate', unit='rad/s', within=(10.0, 2000.0)
     )
-    current: float = parameter(
-        5.0, unit='A', lower=0.1, upper=100.0, description='largest current of a motor'
-    )
+    current: float = parameter(5.0, 'largest current of a motor', unit='A', within=(0.1, 100.0))
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class BridgeParameters:
     """The hardware bridge."""
 
-    sample_time: float = parameter(
-        1e-3, unit='s', lower=1e-3, upper=1e-2, description='time between samples'
-    )
-    driver: str = parameter(
-        'emulated', description='which boards: quanser, emulated, or a driver of your own'
-    )
+    sample_time: float = parameter(1e-3, 'time between samples', unit='s', within=(1e-3, 1e-2))
+    driver: str = parameter('emulated', 'which boards: quanser, emulated, or a driver of your own')
     machine: MachineParameters = group(MachineParameters)
     commutation: CommutationParameters = group(CommutationParameters)
     encoder: EncoderInputParameters = group(EncoderInputParameters)

@@ -47,16 +47,15 @@ class CommutationParameters:
 
     offset: tuple[float, ...] = parameter(
         (0.0, 0.0, 0.0, 0.0),
+        'electrical angle of motors 1..4 at displacement 0',
         unit='rad',
-        lower=-10.0,
-        upper=10.0,
+        within=(-10.0, 10.0),
         length=4,
-        description='electrical angle of motors 1..4 at displacement 0',
     )
     dq_scaling: str = parameter(
         'amplitude',
+        'whether dq currents are amplitudes or RMS values of the phase currents',
         choices=('amplitude', 'rms'),
-        description='whether dq currents are amplitudes or RMS values of the phase currents',
     )
 
 
@@ -66,40 +65,35 @@ class EncoderInputParameters:
 
     board: tuple[int, ...] = parameter(
         (0, 0, 0, 0, 0, 0),
-        lower=0,
-        upper=1,
+        'board, in the order of boards.identifier' + _BY_ENCODER,
+        within=(0, 1),
         length=ENCODERS,
-        description='board, in the order of boards.identifier' + _BY_ENCODER,
     )
     channel: tuple[int, ...] = parameter(
         (0, 1, 2, 3, 4, 5),
-        lower=0,
-        upper=CHANNELS - 1,
+        'encoder input of the board' + _BY_ENCODER,
+        within=(0, CHANNELS - 1),
         length=ENCODERS,
-        description='encoder input of the board' + _BY_ENCODER,
     )
     resolution: tuple[float, ...] = parameter(
         (10e-6,) * ENCODERS,
+        'length of a count' + _BY_ENCODER,
         unit='m',
-        lower=1e-9,
-        upper=1e-3,
+        within=(1e-9, 1e-3),
         length=ENCODERS,
-        description='length of a count' + _BY_ENCODER,
     )
     direction: tuple[int, ...] = parameter(
         (1,) * ENCODERS,
-        lower=-1,
-        upper=1,
+        '1 when counts grow with the length, else -1' + _BY_ENCODER,
+        within=(-1, 1),
         length=ENCODERS,
-        description='1 when counts grow with the length, else -1' + _BY_ENCODER,
     )
     zero: tuple[float, ...] = parameter(
         (0.0,) * ENCODERS,
+        'length at count 0 until homing gives it' + _BY_ENCODER,
         unit='m',
-        lower=-1.0,
-        upper=1.0,
+        within=(-1.0, 1.0),
         length=ENCODERS,
-        description='length at count 0 until homing gives it' + _BY_ENCODER,
     )
 
     def __post_init__(self) -> None:
@@ -112,31 +106,22 @@ class EncoderInputParameters:
 class HomingParameters:
     """Homing: the platen rests on its lower stop and at known x and z; that defines the zeros."""
 
-    at_start: bool = parameter(
-        False, description='home when the boards are configured; false: by ~/home'
-    )
+    at_start: bool = parameter(False, 'home when the boards are configured; false: by ~/home')
     x: float = parameter(
-        -0.05, unit='m', lower=-1.0, upper=1.0, description='where the platen stands along X then'
+        -0.05, 'where the platen stands along X then', unit='m', within=(-1.0, 1.0)
     )
     z: float = parameter(
-        -0.05, unit='m', lower=-1.0, upper=1.0, description='where the platen stands along Z then'
+        -0.05, 'where the platen stands along Z then', unit='m', within=(-1.0, 1.0)
     )
-    samples: int = parameter(
-        20, lower=2, upper=10_000, description='readings that must agree, one per sample'
-    )
+    samples: int = parameter(20, 'readings that must agree, one per sample', within=(2, 10_000))
     spread: float = parameter(
-        3e-5,
-        unit='m',
-        lower=0.0,
-        upper=1e-2,
-        description='how far they may lie apart: the platen must be at rest',
+        3e-5, 'how far they may lie apart: the platen must be at rest', unit='m', within=(0.0, 1e-2)
     )
     shift: float = parameter(
         5e-4,
+        'how far a second homing may move a zero from that of the first',
         unit='m',
-        lower=0.0,
-        upper=1.0,
-        description='how far a second homing may move a zero from that of the first',
+        within=(0.0, 1.0),
     )
 
 
@@ -146,72 +131,63 @@ class DriveParameters:
 
     board: tuple[int, ...] = parameter(
         (0,) * 6 + (1,) * 6,
-        lower=0,
-        upper=1,
+        'board, in the order of boards.identifier' + _BY_PHASE,
+        within=(0, 1),
         length=PHASES,
-        description='board, in the order of boards.identifier' + _BY_PHASE,
     )
     channel: tuple[int, ...] = parameter(
         (0, 1, 2, 3, 4, 5) * 2,
-        lower=0,
-        upper=CHANNELS - 1,
+        'analog output of the board' + _BY_PHASE,
+        within=(0, CHANNELS - 1),
         length=PHASES,
-        description='analog output of the board' + _BY_PHASE,
     )
     gain: tuple[float, ...] = parameter(
         (1.0,) * PHASES,
+        'current per volt' + _BY_PHASE,
         unit='A/V',
-        lower=0.01,
-        upper=100.0,
+        within=(0.01, 100.0),
         length=PHASES,
-        description='current per volt' + _BY_PHASE,
     )
     offset: tuple[float, ...] = parameter(
         (0.0,) * PHASES,
+        'voltage that makes no current' + _BY_PHASE,
         unit='V',
-        lower=-1.0,
-        upper=1.0,
+        within=(-1.0, 1.0),
         length=PHASES,
-        description='voltage that makes no current' + _BY_PHASE,
     )
     sign: tuple[int, ...] = parameter(
         (1,) * PHASES,
-        lower=-1,
-        upper=1,
+        '-1 where the phase is connected the other way round' + _BY_PHASE,
+        within=(-1, 1),
         length=PHASES,
-        description='-1 where the phase is connected the other way round' + _BY_PHASE,
     )
     voltage_range: float = parameter(
-        10.0, unit='V', lower=0.1, upper=20.0, description='the outputs reach plus and minus this'
+        10.0, 'the outputs reach plus and minus this', unit='V', within=(0.1, 20.0)
     )
-    slew: float = parameter(
-        1e5, unit='A/s', lower=1.0, upper=1e7, description='fastest change of a phase current'
-    )
+    slew: float = parameter(1e5, 'fastest change of a phase current', unit='A/s', within=(1.0, 1e7))
     peak_current: float = parameter(
-        7.0, unit='A', lower=0.1, upper=100.0, description='a phase current is limited to this'
+        7.0, 'a phase current is limited to this', unit='A', within=(0.1, 100.0)
     )
     continuous_current: float = parameter(
-        5.0, unit='A', lower=0.1, upper=100.0, description='current a phase carries for ever'
+        5.0, 'current a phase carries for ever', unit='A', within=(0.1, 100.0)
     )
     thermal_time: float = parameter(
         2.0,
+        'time constant of the I2t load, which follows (current / continuous)^2',
         unit='s',
-        lower=0.01,
-        upper=1e4,
-        description='time constant of the I2t load, which follows (current / continuous)^2',
+        within=(0.01, 1e4),
     )
     warn_load: float = parameter(
-        0.7, lower=0.0, upper=1.0, description='I2t load from which on a warning is given'
+        0.7, 'I2t load from which on a warning is given', within=(0.0, 1.0)
     )
     derate_load: float = parameter(
         0.85,
-        lower=0.0,
-        upper=1.0,
-        description='I2t load from which on the peak shrinks; the continuous current is left '
-        'halfway to trip_load',
+        'I2t load from which on the peak shrinks; the continuous current is left halfway '
+        'to trip_load',
+        within=(0.0, 1.0),
     )
     trip_load: float = parameter(
-        0.98, lower=0.0, upper=1.0, description='I2t load that is a fault: the budget is spent'
+        0.98, 'I2t load that is a fault: the budget is spent', within=(0.0, 1.0)
     )
 
     def __post_init__(self) -> None:
@@ -234,39 +210,28 @@ class DriveParameters:
 class BoardParameters:
     """The two boards and what guards them."""
 
-    type: str = parameter('q8', description="the boards' type, as the vendor names it")
-    identifier: tuple[str, ...] = parameter(
-        ('0', '1'), length=2, description="the boards' identifiers"
-    )
+    type: str = parameter('q8', "the boards' type, as the vendor names it")
+    identifier: tuple[str, ...] = parameter(('0', '1'), "the boards' identifiers", length=2)
     watchdog: float = parameter(
         0.02,
+        "the boards' own watchdog: without a sample for this long they put out 0 V",
         unit='s',
-        lower=0.002,
-        upper=1.0,
-        description="the boards' own watchdog: without a sample for this long they put out 0 V",
+        within=(0.002, 1.0),
     )
     buffer: int = parameter(
-        50, lower=2, upper=10_000, description='samples the board keeps for a bridge that is late'
+        50, 'samples the board keeps for a bridge that is late', within=(2, 10_000)
     )
     overrun: float = parameter(
-        0.005,
-        unit='s',
-        lower=0.001,
-        upper=1.0,
-        description='a sample that is read this late is a fault',
+        0.005, 'a sample that is read this late is a fault', unit='s', within=(0.001, 1.0)
     )
     stop_input: int = parameter(
-        -1,
-        lower=-1,
-        upper=31,
-        description='digital input of the first board that is an emergency stop; -1: none',
+        -1, 'digital input of the first board that is an emergency stop; -1: none', within=(-1, 31)
     )
     stop_level: int = parameter(
-        0, lower=0, upper=1, description='level of that input that means stop; 0 is fail-safe'
+        0, 'level of that input that means stop; 0 is fail-safe', within=(0, 1)
     )
     enable_output: int = parameter(
         -1,
-        lower=-1,
-        upper=31,
-        description='digital output of the first board that enables the amplifiers; -1: none',
+        'digital output of the first board that enables the amplifiers; -1: none',
+        within=(-1, 31),
     )

@@ -15,30 +15,27 @@ class GuideParameters:
 
     coulomb: tuple[float, ...] = parameter(
         (0.303, 0.171, 0.149, 1.32, 1.32),
+        'Coulomb friction f in f tanh(v / v0)' + _BY_AXIS,
         unit='m/s^2, rad/s^2',
-        lower=0.0,
-        upper=100.0,
+        within=(0.0, 100.0),
         length=5,
-        description='Coulomb friction f in f tanh(v / v0)' + _BY_AXIS,
     )
     coulomb_velocity: tuple[float, ...] = parameter(
         (1e-3, 1e-3, 1e-3, 1e-3, 1e-3),
+        'velocity v0 in f tanh(v / v0)' + _BY_AXIS,
         unit='m/s, rad/s',
-        lower=1e-6,
-        upper=0.1,
+        within=(1e-6, 0.1),
         length=5,
-        description='velocity v0 in f tanh(v / v0)' + _BY_AXIS,
     )
     viscous: tuple[float, ...] = parameter(
         (0.5, 0.5, 0.5, 0.5, 0.5),
+        'viscous friction' + _BY_AXIS,
         unit='1/s',
-        lower=0.0,
-        upper=1000.0,
+        within=(0.0, 1000.0),
         length=5,
-        description='viscous friction' + _BY_AXIS,
     )
     locked: tuple[bool, ...] = parameter(
         (False, False, False, False, False),
+        'stopper inserted: the axis keeps its initial position' + _BY_AXIS,
         length=5,
-        description='stopper inserted: the axis keeps its initial position' + _BY_AXIS,
     )

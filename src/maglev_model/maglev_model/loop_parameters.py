@@ -16,11 +16,7 @@ class FundamentalParameters:
     """What the internal models of all axes are built on."""
 
     fundamental: float = parameter(
-        REFERENCE_FREQUENCY,
-        unit='rad/s',
-        lower=1e-3,
-        upper=1e3,
-        description='frequency of the reference, omega_0',
+        REFERENCE_FREQUENCY, 'frequency of the reference, omega_0', unit='rad/s', within=(1e-3, 1e3)
     )
 
 
@@ -34,16 +30,15 @@ class AxisLoopParameters:
 
     multiples: tuple[float, ...] = parameter(
         (0.0, 1.0, 2.0, 3.0, 4.0, 5.0),
-        lower=0.0,
-        upper=100.0,
-        description='frequencies of the internal model, as multiples of its fundamental',
+        'frequencies of the internal model, as multiples of its fundamental',
+        within=(0.0, 100.0),
     )
     bandwidth: float = parameter(
-        200.0, unit='rad/s', lower=0.1, upper=1e4, description='bandwidth of the feedback, W'
+        200.0, 'bandwidth of the feedback, W', unit='rad/s', within=(0.1, 1e4)
     )
     integration: float = parameter(
-        90.0, unit='rad/s', lower=1e-3, upper=1e4, description='how fast the integrator learns, i'
+        90.0, 'how fast the integrator learns, i', unit='rad/s', within=(1e-3, 1e4)
     )
     learning: float = parameter(
-        10.0, unit='rad/s', lower=1e-3, upper=1e4, description='how fast the oscillators learn, m'
+        10.0, 'how fast the oscillators learn, m', unit='rad/s', within=(1e-3, 1e4)
     )

@@ -27,95 +27,66 @@ VACUUM_PERMEABILITY = 4e-7 * math.pi
 class MachineParameters:
     """Table I, the torsional springs of (7), gravity, and the range the stops leave."""
 
-    slot_width: float = parameter(
-        12.7e-3, unit='m', lower=1e-3, upper=0.1, description='stator slot width b_0'
-    )
-    slot_pitch: float = parameter(
-        19.05e-3, unit='m', lower=1e-3, upper=0.1, description='stator slot pitch t_1'
-    )
-    turns: int = parameter(900, lower=1, upper=100_000, description='turns per phase W')
+    slot_width: float = parameter(12.7e-3, 'stator slot width b_0', unit='m', within=(1e-3, 0.1))
+    slot_pitch: float = parameter(19.05e-3, 'stator slot pitch t_1', unit='m', within=(1e-3, 0.1))
+    turns: int = parameter(900, 'turns per phase W', within=(1, 100_000))
     winding_factor: float = parameter(
-        1.0, lower=0.1, upper=1.0, description='winding factor of the first harmonic k_w1'
+        1.0, 'winding factor of the first harmonic k_w1', within=(0.1, 1.0)
     )
-    pole_pairs: int = parameter(3, lower=1, upper=100, description='stator pole pairs p per motor')
-    pole_pitch: float = parameter(
-        57.15e-3, unit='m', lower=5e-3, upper=0.5, description='pole pitch tau'
-    )
-    magnet_height: float = parameter(
-        5e-3, unit='m', lower=1e-4, upper=0.1, description='magnet height h_m'
-    )
-    magnet_length: float = parameter(
-        50e-3, unit='m', lower=1e-3, upper=1.0, description='magnet length L_A'
-    )
-    magnet_width: float = parameter(
-        28.58e-3, unit='m', lower=1e-3, upper=0.5, description='magnet width tau_p'
-    )
-    magnets: int = parameter(4, lower=1, upper=100, description='number of magnets p_m per motor')
+    pole_pairs: int = parameter(3, 'stator pole pairs p per motor', within=(1, 100))
+    pole_pitch: float = parameter(57.15e-3, 'pole pitch tau', unit='m', within=(5e-3, 0.5))
+    magnet_height: float = parameter(5e-3, 'magnet height h_m', unit='m', within=(1e-4, 0.1))
+    magnet_length: float = parameter(50e-3, 'magnet length L_A', unit='m', within=(1e-3, 1.0))
+    magnet_width: float = parameter(28.58e-3, 'magnet width tau_p', unit='m', within=(1e-3, 0.5))
+    magnets: int = parameter(4, 'number of magnets p_m per motor', within=(1, 100))
     magnet_charge: float = parameter(
         875_400.0,
+        'magnetic surface charge sigma_m, here the coercivity H_c',
         unit='A/m',
-        lower=1e5,
-        upper=2e6,
-        description='magnetic surface charge sigma_m, here the coercivity H_c',
+        within=(1e5, 2e6),
     )
     recoil_permeability: float = parameter(
-        1.05, lower=1.0, upper=2.0, description='relative recoil permeability mu_rec of the magnets'
+        1.05, 'relative recoil permeability mu_rec of the magnets', within=(1.0, 2.0)
     )
     motors: int = parameter(
         4,
-        lower=1,
-        upper=4,
-        description='4, or 1: motor 2 alone, the machine of refs. [10], [11], moving in y and x',
+        '4, or 1: motor 2 alone, the machine of refs. [10], [11], moving in y and x',
+        within=(1, 4),
     )
-    mass_x: float = parameter(
-        10.6, unit='kg', lower=0.1, upper=1000.0, description='moving mass M_x along X'
-    )
-    mass_z: float = parameter(
-        8.6, unit='kg', lower=0.1, upper=1000.0, description='moving mass M_z along Z'
-    )
-    mass_y: float = parameter(
-        6.9, unit='kg', lower=0.1, upper=1000.0, description='moving mass M_y along Y'
-    )
+    mass_x: float = parameter(10.6, 'moving mass M_x along X', unit='kg', within=(0.1, 1000.0))
+    mass_z: float = parameter(8.6, 'moving mass M_z along Z', unit='kg', within=(0.1, 1000.0))
+    mass_y: float = parameter(6.9, 'moving mass M_y along Y', unit='kg', within=(0.1, 1000.0))
     radius: float = parameter(
-        0.397, unit='m', lower=0.01, upper=5.0, description='platen centre to mover centres r'
+        0.397, 'platen centre to mover centres r', unit='m', within=(0.01, 5.0)
     )
     inertia: float = parameter(
         0.5268,
+        'moment of inertia about the X and the Z axis, I_x = I_z',
         unit='kg m^2',
-        lower=1e-3,
-        upper=1000.0,
-        description='moment of inertia about the X and the Z axis, I_x = I_z',
+        within=(1e-3, 1000.0),
     )
-    gravity: float = parameter(
-        9.81, unit='m/s^2', lower=0.0, upper=30.0, description='acceleration of gravity G'
-    )
+    gravity: float = parameter(9.81, 'acceleration of gravity G', unit='m/s^2', within=(0.0, 30.0))
     spring_phi: float = parameter(
-        4000.0, unit='1/s^2', lower=0.0, upper=1e6, description='torsional spring k_s_phi'
+        4000.0, 'torsional spring k_s_phi', unit='1/s^2', within=(0.0, 1e6)
     )
     spring_theta: float = parameter(
-        900.0, unit='1/s^2', lower=0.0, upper=1e6, description='torsional spring k_s_theta'
+        900.0, 'torsional spring k_s_theta', unit='1/s^2', within=(0.0, 1e6)
     )
-    gap_min: float = parameter(
-        0.018, unit='m', lower=1e-3, upper=0.2, description='air gap y at the upper stop'
-    )
+    gap_min: float = parameter(0.018, 'air gap y at the upper stop', unit='m', within=(1e-3, 0.2))
     gap_max: float = parameter(
-        0.031, unit='m', lower=1e-3, upper=0.2, description='air gap y at the lower stop (at rest)'
+        0.031, 'air gap y at the lower stop (at rest)', unit='m', within=(1e-3, 0.2)
     )
     x_max: float = parameter(
-        0.05, unit='m', lower=1e-4, upper=1.0, description='stops along X at plus and minus this'
+        0.05, 'stops along X at plus and minus this', unit='m', within=(1e-4, 1.0)
     )
     z_max: float = parameter(
-        0.05, unit='m', lower=1e-4, upper=1.0, description='stops along Z at plus and minus this'
+        0.05, 'stops along Z at plus and minus this', unit='m', within=(1e-4, 1.0)
     )
     phi_max: float = parameter(
-        0.003, unit='rad', lower=1e-5, upper=0.1, description='stops of phi at plus and minus this'
+        0.003, 'stops of phi at plus and minus this', unit='rad', within=(1e-5, 0.1)
     )
     theta_max: float = parameter(
-        0.014,
-        unit='rad',
-        lower=1e-5,
-        upper=0.1,
-        description='stops of theta at plus and minus this',
+        0.014, 'stops of theta at plus and minus this', unit='rad', within=(1e-5, 0.1)
     )
 
     def __post_init__(self) -> None:

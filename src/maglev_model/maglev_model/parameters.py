@@ -117,16 +117,21 @@ class Spec:
 
 def parameter(
     default: Any = dataclasses.MISSING,
+    description: str = '',
     *,
-    description: str,
     unit: str = '',
+    within: tuple[float, float] | None = None,
     lower: float | None = None,
     upper: float | None = None,
     choices: Sequence[str] = (),
     length: int | None = None,
     read_only: bool = False,
 ) -> Any:
-    """A dataclass field that is a parameter. ``unit`` is the SI unit, bounds are inclusive."""
+    """A dataclass field that is a parameter. ``unit`` is the SI unit, bounds are inclusive.
+
+    ``within`` gives both bounds, ``lower`` or ``upper`` one.
+    """
+    lower, upper = within or (lower, upper)
     metadata = {
         _METADATA_KEY: {
             'description': description,

@@ -19,9 +19,7 @@ class ManagedParameters(SourceParameters):
     """What every managed node takes."""
 
     autostart: bool = parameter(
-        True,
-        description='configure and activate by itself; false: by the life-cycle services',
-        read_only=True,
+        True, 'configure and activate by itself; false: by the life-cycle services', read_only=True
     )
 
 

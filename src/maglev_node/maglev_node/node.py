@@ -35,9 +35,7 @@ class NodeParameters:
     """What every node takes."""
 
     effective_parameters: str = parameter(
-        '',
-        description='file to write the parameters in effect to; empty: none',
-        read_only=True,
+        '', 'file to write the parameters in effect to; empty: none', read_only=True
     )
 
 
@@ -47,22 +45,20 @@ class SourceParameters(NodeParameters):
 
     mode: str = parameter(
         'lockstep',
+        'lockstep: each sample waits for its answer; realtime: by the clock',
         choices=('lockstep', 'realtime'),
-        description='lockstep: each sample waits for its answer; realtime: by the clock',
         read_only=True,
     )
     realtime_priority: int = parameter(
         40,
-        lower=0,
-        upper=98,
-        description='realtime: SCHED_FIFO priority of the process, where permitted; 0: none',
+        'realtime: SCHED_FIFO priority of the process, where permitted; 0: none',
+        within=(0, 98),
         read_only=True,
     )
     watchers: int = parameter(
         0,
-        lower=0,
-        upper=100,
-        description='nodes that watch every sample (monitor, recorder), waited for at the start',
+        'nodes that watch every sample (monitor, recorder), waited for at the start',
+        within=(0, 100),
         read_only=True,
     )
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from rclpy.node import Node
+from rclpy.qos import QoSProfile
 
 from maglev_node.topics import sample_qos
 
@@ -31,14 +32,15 @@ class Queues:
         )
 
     def subscribe(
-        self, topic: str, message_type: type, *, depth: int = 16384, raw: bool = False
+        self, topic: str, message_type: type, qos: QoSProfile | None = None, *, raw: bool = False
     ) -> PolledSubscription:
-        """A queue of ``depth`` messages; ``raw`` gives them serialised, as bytes.
+        """A queue of messages, by default for samples; ``raw`` gives them serialised, as bytes.
 
-        ``depth`` must cover what arrives between two polls; with depth 1 it holds the newest.
+        The depth of ``qos`` must cover what arrives between two polls; with depth 1 the queue holds
+        the newest.
         """
         subscription = self._companion.create_subscription(
-            message_type, topic, _never_called, sample_qos(depth), raw=raw
+            message_type, topic, _never_called, qos or sample_qos(), raw=raw
         )
         return PolledSubscription(subscription)
 

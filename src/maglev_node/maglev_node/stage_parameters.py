@@ -14,16 +14,14 @@ class StageNodeParameters(ManagedParameters):
 
     answer_timeout: float = parameter(
         5.0,
+        'lockstep: longest wait for the currents of a sample, wall clock',
         unit='s',
-        lower=0.1,
-        upper=600.0,
-        description='lockstep: longest wait for the currents of a sample, wall clock',
+        within=(0.1, 600.0),
     )
     first_sequence: int = parameter(
         0,
-        lower=0,
-        upper=2**62,
-        description='number of the first sample, to go on where another stage has ended',
+        'number of the first sample, to go on where another stage has ended',
+        within=(0, 2**62),
         read_only=True,
     )
 
@@ -33,9 +31,5 @@ class ClockedStageParameters(StageNodeParameters):
     """What the node of a stage takes that has no clock of its own."""
 
     overrun_limit: float = parameter(
-        0.5,
-        unit='s',
-        lower=0.005,
-        upper=10.0,
-        description='realtime: the stage gives up when it runs this late',
+        0.5, 'realtime: the stage gives up when it runs this late', unit='s', within=(0.005, 10.0)
     )

@@ -34,3 +34,16 @@ def sample_qos(depth: int = 16384) -> QoSProfile:
         reliability=ReliabilityPolicy.RELIABLE,
         durability=DurabilityPolicy.VOLATILE,
     )
+
+
+def reference_qos(depth: int = 16384) -> QoSProfile:
+    """As :func:`sample_qos`, but the last ``depth`` samples are kept for a controller to come.
+
+    The reference may see the controller before that sees the reference.
+    """
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=depth,
+        reliability=ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL,
+    )

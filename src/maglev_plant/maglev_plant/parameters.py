@@ -23,34 +23,31 @@ class AmplifierParameters:
 
     bandwidth: float = parameter(
         2000.0,
+        'corner frequency of the first-order current loop, 0 for no lag',
         unit='Hz',
-        lower=0.0,
-        upper=1e5,
-        description='corner frequency of the first-order current loop, 0 for no lag',
+        within=(0.0, 1e5),
     )
     peak_current: float = parameter(
-        7.0, unit='A', lower=0.1, upper=100.0, description='greatest current of a phase'
+        7.0, 'greatest current of a phase', unit='A', within=(0.1, 100.0)
     )
     continuous_current: float = parameter(
-        5.0, unit='A', lower=0.1, upper=100.0, description='current a phase carries for ever'
+        5.0, 'current a phase carries for ever', unit='A', within=(0.1, 100.0)
     )
     thermal_time: float = parameter(
         2.0,
+        'time constant of the thermal load, which follows (current / continuous)^2',
         unit='s',
-        lower=0.01,
-        upper=1e4,
-        description='time constant of the thermal load, which follows (current / continuous)^2',
+        within=(0.01, 1e4),
     )
     thermal_recovery: float = parameter(
         0.9,
-        lower=0.0,
-        upper=1.0,
-        description='a phase that has spent its budget (load 1) gets its peak back below this load',
+        'a phase that has spent its budget (load 1) gets its peak back below this load',
+        within=(0.0, 1.0),
     )
     dq_scaling: str = parameter(
         'amplitude',
+        'whether dq currents are amplitudes or RMS values of the phase currents',
         choices=('amplitude', 'rms'),
-        description='whether dq currents are amplitudes or RMS values of the phase currents',
     )
 
     def __post_init__(self) -> None:
@@ -67,28 +64,22 @@ class EncoderParameters:
     """Four encoders on the vertical guides, which read the gaps, and two horizontal ones."""
 
     gap_resolution: float = parameter(
-        10e-6, unit='m', lower=0.0, upper=1e-3, description='count of the gap encoders, 0 for none'
+        10e-6, 'count of the gap encoders, 0 for none', unit='m', within=(0.0, 1e-3)
     )
     horizontal_resolution: float = parameter(
-        10e-6,
-        unit='m',
-        lower=0.0,
-        upper=1e-3,
-        description='count of the x and z encoders, 0 for none',
+        10e-6, 'count of the x and z encoders, 0 for none', unit='m', within=(0.0, 1e-3)
     )
     gap_noise: float = parameter(
         0.0,
+        'standard deviation of Gaussian noise before the gap encoders count',
         unit='m',
-        lower=0.0,
-        upper=1e-3,
-        description='standard deviation of Gaussian noise before the gap encoders count',
+        within=(0.0, 1e-3),
     )
     horizontal_noise: float = parameter(
         0.0,
+        'standard deviation of Gaussian noise before the x and z encoders count',
         unit='m',
-        lower=0.0,
-        upper=1e-3,
-        description='standard deviation of Gaussian noise before the x and z encoders count',
+        within=(0.0, 1e-3),
     )
 
 
@@ -98,12 +89,11 @@ class StopParameters:
 
     seat_radius: float = parameter(
         0.1,
-        unit='m',
-        lower=0.0,
-        upper=1.0,
-        description='distance of the seats from the centre: y +- radius * tilt stays in the gap '
-        'range, and a platen that rests is held level; 0 stops y alone, the radius to the movers '
+        'distance of the seats from the centre: y +- radius * tilt stays in the gap range, '
+        'and a platen that rests is held level; 0 stops y alone, the radius to the movers '
         'stops each gap',
+        unit='m',
+        within=(0.0, 1.0),
     )
 
 
@@ -113,40 +103,36 @@ class DisturbanceParameters:
 
     constant: tuple[float, ...] = parameter(
         (0.0, 0.0, 0.0, 0.0, 0.0),
+        'constant part' + _BY_AXIS,
         unit='N, N m',
-        lower=-1e4,
-        upper=1e4,
+        within=(-1e4, 1e4),
         length=5,
-        description='constant part' + _BY_AXIS,
     )
     amplitude: tuple[float, ...] = parameter(
         (0.0, 0.0, 0.0, 0.0, 0.0),
+        'amplitude of the sinusoid' + _BY_AXIS,
         unit='N, N m',
-        lower=-1e4,
-        upper=1e4,
+        within=(-1e4, 1e4),
         length=5,
-        description='amplitude of the sinusoid' + _BY_AXIS,
     )
     frequency: tuple[float, ...] = parameter(
         (0.75, 0.75, 0.75, 0.75, 0.75),
+        'frequency of the sinusoid' + _BY_AXIS,
         unit='Hz',
-        lower=0.0,
-        upper=500.0,
+        within=(0.0, 500.0),
         length=5,
-        description='frequency of the sinusoid' + _BY_AXIS,
     )
     phase: tuple[float, ...] = parameter(
         (0.0, 0.0, 0.0, 0.0, 0.0),
+        'phase of the sinusoid at sample 0' + _BY_AXIS,
         unit='rad',
-        lower=-10.0,
-        upper=10.0,
+        within=(-10.0, 10.0),
         length=5,
-        description='phase of the sinusoid at sample 0' + _BY_AXIS,
     )
 
 
 def _factor(name: str) -> Any:
-    return parameter(1.0, lower=0.1, upper=10.0, description=f"the plant's {name} by the machine's")
+    return parameter(1.0, f"the plant's {name} by the machine's", within=(0.1, 10.0))
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -171,19 +157,17 @@ class InitialParameters:
 
     position: tuple[float, ...] = parameter(
         (0.031, 0.0, 0.0, 0.0, 0.0),
+        'position' + _BY_AXIS,
         unit='m, rad',
-        lower=-1.0,
-        upper=1.0,
+        within=(-1.0, 1.0),
         length=5,
-        description='position' + _BY_AXIS,
     )
     velocity: tuple[float, ...] = parameter(
         (0.0, 0.0, 0.0, 0.0, 0.0),
+        'velocity' + _BY_AXIS,
         unit='m/s, rad/s',
-        lower=-10.0,
-        upper=10.0,
+        within=(-10.0, 10.0),
         length=5,
-        description='velocity' + _BY_AXIS,
     )
 
 
@@ -191,19 +175,14 @@ class InitialParameters:
 class PlantParameters:
     """The simulated stage."""
 
-    sample_time: float = parameter(
-        1e-3, unit='s', lower=1e-4, upper=1e-2, description='time between samples'
-    )
-    substeps: int = parameter(
-        2, lower=1, upper=1000, description='Runge-Kutta steps of fourth order per sample'
-    )
-    seed: int = parameter(0, lower=0, upper=2**31 - 1, description='seed of the encoder noise')
+    sample_time: float = parameter(1e-3, 'time between samples', unit='s', within=(1e-4, 1e-2))
+    substeps: int = parameter(2, 'Runge-Kutta steps of fourth order per sample', within=(1, 1000))
+    seed: int = parameter(0, 'seed of the encoder noise', within=(0, 2**31 - 1))
     watchdog: float = parameter(
         0.05,
+        'without fresh currents for this long in flight they are cut',
         unit='s',
-        lower=0.002,
-        upper=1.0,
-        description='without fresh currents for this long in flight they are cut',
+        within=(0.002, 1.0),
     )
     machine: MachineParameters = group(MachineParameters)
     amplifier: AmplifierParameters = group(AmplifierParameters)

@@ -20,7 +20,7 @@ from maglev_node.node import MaglevNode, SourceParameters
 from maglev_node.polling import Queues
 from maglev_node.process import main as run_main
 from maglev_node.stamp import stamp_now
-from maglev_node.topics import CURRENTS, MEASUREMENT, REFERENCE, sample_qos
+from maglev_node.topics import CURRENTS, MEASUREMENT, REFERENCE, reference_qos, sample_qos
 from maglev_reference.accuracy import summary, warnings
 from maglev_reference.check import UnreachableError
 from maglev_reference.parameters import ReferenceParameters
@@ -34,34 +34,27 @@ _REMINDER = 5.0  # between two lines about what is waited for [s]
 class ReferenceNodeParameters(SourceParameters, ReferenceParameters):
     """The reference and how it is published."""
 
-    autostart: bool = parameter(
-        True, description='start by itself; false: by ~/lift_off', read_only=True
-    )
-    exit_at_end: bool = parameter(
-        False, description='end the process when the run is over', read_only=True
-    )
+    autostart: bool = parameter(True, 'start by itself; false: by ~/lift_off', read_only=True)
+    exit_at_end: bool = parameter(False, 'end the process when the run is over', read_only=True)
     lead: int = parameter(
         64,
-        description='how far the reference is published ahead',
+        'how far the reference is published ahead',
         unit='samples',
-        lower=1,
-        upper=200,
+        within=(1, 200),
         read_only=True,
     )
     poll_period: float = parameter(
         0.004,
-        description='how often the newest measurement is looked at, wall clock',
+        'how often the newest measurement is looked at, wall clock',
         unit='s',
-        lower=0.0005,
-        upper=0.1,
+        within=(0.0005, 0.1),
         read_only=True,
     )
     timeout: float = parameter(
         1.0,
-        description='longest time without a measurement while running, wall clock',
+        'longest time without a measurement while running, wall clock',
         unit='s',
-        lower=0.05,
-        upper=600.0,
+        within=(0.05, 600.0),
         read_only=True,
     )
 
@@ -88,13 +81,13 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         self._seen = self._reminded = time.monotonic()
         self._message = Reference()
         self._message.header.frame_id = 'stage'
-        self._publisher = self.create_publisher(Reference, REFERENCE, sample_qos())
+        self._publisher = self.create_publisher(Reference, REFERENCE, reference_qos())
         self._queues = Queues(self)
-        self._measurements = self._queues.subscribe(MEASUREMENT, Measurement, depth=1)
+        self._measurements = self._queues.subscribe(MEASUREMENT, Measurement, sample_qos(1))
         # In real time nobody waits for the controller but us; in lockstep it waits for us.
         self._answers = None
         if self.parameters.mode == 'realtime':
-            self._answers = self._queues.subscribe(CURRENTS, Currents, depth=1)
+            self._answers = self._queues.subscribe(CURRENTS, Currents, sample_qos(1))
         self.create_service(Trigger, '~/lift_off', self._lift_off)
         self.create_service(Trigger, '~/land', self._land)
         self.create_timer(self.parameters.poll_period, self._poll, clock=self.steady_clock)

@@ -45,59 +45,52 @@ class ReferenceLimits:
 
     lower: tuple[float, ...] = parameter(
         (0.018, -0.05, -0.05, -0.003, -0.014),
-        description='least position of each output',
+        'least position of each output',
         unit='m, rad',
-        lower=-0.1,
-        upper=0.1,
+        within=(-0.1, 0.1),
         length=5,
     )
     upper: tuple[float, ...] = parameter(
         (0.031, 0.05, 0.05, 0.003, 0.014),
-        description='greatest position of each output',
+        'greatest position of each output',
         unit='m, rad',
-        lower=-0.1,
-        upper=0.1,
+        within=(-0.1, 0.1),
         length=5,
     )
     motor_gap: tuple[float, ...] = parameter(
         (0.018, 0.033),
-        description='least and greatest air gap at each motor, tilt included',
+        'least and greatest air gap at each motor, tilt included',
         unit='m',
-        lower=0.01,
-        upper=0.1,
+        within=(0.01, 0.1),
         length=2,
     )
     velocity: tuple[float, ...] = parameter(
         (0.2, 1.0, 1.0, 0.1, 0.5),
-        description='greatest speed of each output',
+        'greatest speed of each output',
         unit='m/s, rad/s',
-        lower=1e-4,
-        upper=10.0,
+        within=(1e-4, 10.0),
         length=5,
     )
     acceleration: tuple[float, ...] = parameter(
         (5.0, 15.0, 15.0, 5.0, 20.0),
-        description='greatest acceleration of each output',
+        'greatest acceleration of each output',
         unit='m/s^2, rad/s^2',
-        lower=1e-3,
-        upper=100.0,
+        within=(1e-3, 100.0),
         length=5,
     )
     step: tuple[float, ...] = parameter(
         (0.01, 0.06, 0.06, 0.006, 0.02),
-        description='greatest step of each output',
+        'greatest step of each output',
         unit='m, rad',
-        lower=0.0,
-        upper=0.1,
+        within=(0.0, 0.1),
         length=5,
     )
     current: float = parameter(
         6.0,
-        description='greatest phase current of a motor, friction included; '
-        'the amplifiers give 7 A, the rest is for feedback',
+        'greatest phase current of a motor, friction included; the amplifiers give 7 A, '
+        'the rest is for feedback',
         unit='A',
-        lower=0.1,
-        upper=100.0,
+        within=(0.1, 100.0),
     )
 
     def __post_init__(self) -> None:
@@ -115,22 +108,15 @@ class ReferenceLimits:
 class LiftOffParameters:
     """From the lower stop to the home position."""
 
-    wait: float = parameter(
-        0.2, description='rest on the stop before lift-off', unit='s', lower=0.001, upper=60.0
-    )
-    time: float = parameter(1.5, description='time of lift-off', unit='s', lower=0.1, upper=60.0)
-    settle: float = parameter(
-        1.0, description='hold after lift-off', unit='s', lower=0.0, upper=60.0
-    )
-    rest_gap: float = parameter(
-        0.031, description='gap on the lower stop', unit='m', lower=0.018, upper=0.1
-    )
+    wait: float = parameter(0.2, 'rest on the stop before lift-off', unit='s', within=(0.001, 60.0))
+    time: float = parameter(1.5, 'time of lift-off', unit='s', within=(0.1, 60.0))
+    settle: float = parameter(1.0, 'hold after lift-off', unit='s', within=(0.0, 60.0))
+    rest_gap: float = parameter(0.031, 'gap on the lower stop', unit='m', within=(0.018, 0.1))
     rest_tolerance: float = parameter(
         0.001,
-        description='how far from rest_gap the platen may be found before lift-off',
+        'how far from rest_gap the platen may be found before lift-off',
         unit='m',
-        lower=0.0,
-        upper=0.05,
+        within=(0.0, 0.05),
     )
 
 
@@ -139,18 +125,14 @@ class DescentParameters:
     """From any position down to the lower stop, the last part at crawling speed."""
 
     brake_time: float = parameter(
-        0.5,
-        description='time to come to rest when told to land while moving',
-        unit='s',
-        lower=0.05,
-        upper=10.0,
+        0.5, 'time to come to rest when told to land while moving', unit='s', within=(0.05, 10.0)
     )
-    time: float = parameter(2.0, description='time of the descent', unit='s', lower=0.1, upper=60.0)
+    time: float = parameter(2.0, 'time of the descent', unit='s', within=(0.1, 60.0))
     crawl_distance: float = parameter(
-        0.0005, description='last part of the descent', unit='m', lower=1e-5, upper=0.005
+        0.0005, 'last part of the descent', unit='m', within=(1e-5, 0.005)
     )
     crawl_speed: float = parameter(
-        0.001, description='speed where the last part begins', unit='m/s', lower=1e-4, upper=0.01
+        0.001, 'speed where the last part begins', unit='m/s', within=(1e-4, 0.01)
     )
 
 
@@ -160,9 +142,8 @@ class InternalModelParameters(FundamentalParameters):
 
     sampling: float = parameter(
         2.05,
-        description='error with sampling and observer, by that of the same weights without',
-        lower=1.0,
-        upper=100.0,
+        'error with sampling and observer, by that of the same weights without',
+        within=(1.0, 100.0),
     )
 
 
@@ -175,39 +156,35 @@ class ReferenceParameters:
     """
 
     sample_time: float = parameter(
-        0.001, description='time from one sample to the next', unit='s', lower=1e-4, upper=0.01
+        0.001, 'time from one sample to the next', unit='s', within=(1e-4, 0.01)
     )
     trajectory: str = parameter(
-        'sinusoids', description='what is followed while measured', choices=TRAJECTORIES
+        'sinusoids', 'what is followed while measured', choices=TRAJECTORIES
     )
     duration: float = parameter(
         60.0,
-        description='measured time: of the tracking window, or of each step',
+        'measured time: of the tracking window, or of each step',
         unit='s',
-        lower=0.01,
-        upper=36000.0,
+        within=(0.01, 36000.0),
     )
     run_in: float = parameter(
         8.0,
-        description='time on the trajectory before the tracking window, so that transients decay',
+        'time on the trajectory before the tracking window, so that transients decay',
         unit='s',
-        lower=0.0,
-        upper=600.0,
+        within=(0.0, 600.0),
     )
     home: tuple[float, ...] = parameter(
         (0.025, 0.0, 0.0, 0.0, 0.0),
-        description='where the platen hovers: y, x, z, phi, theta',
+        'where the platen hovers: y, x, z, phi, theta',
         unit='m, rad',
-        lower=-0.05,
-        upper=0.05,
+        within=(-0.05, 0.05),
         length=5,
     )
     move_time: float = parameter(
         1.0,
-        description='time of moves to and from what is measured; longer where limits need it',
+        'time of moves to and from what is measured; longer where limits need it',
         unit='s',
-        lower=0.05,
-        upper=60.0,
+        within=(0.05, 60.0),
     )
     lift_off: LiftOffParameters = group(LiftOffParameters)
     sinusoids: SinusoidParameters = group(SinusoidParameters)

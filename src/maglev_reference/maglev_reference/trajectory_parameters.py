@@ -26,29 +26,18 @@ def same_length(where: str, names: Sequence[str], lengths: Sequence[int]) -> Non
 class TiltSinusoids:
     """offset + sum_i amplitude_i sin(frequency_i t + phase_i); t = 0 as measuring starts."""
 
-    offset: float = parameter(
-        0.0, description='mean position', unit='rad', lower=-0.014, upper=0.014
-    )
+    offset: float = parameter(0.0, 'mean position', unit='rad', within=(-0.014, 0.014))
     amplitude: tuple[float, ...] = parameter(
-        (0.0,),
-        description='amplitude of each sinusoid',
-        unit='rad',
-        lower=-0.014,
-        upper=0.014,
+        (0.0,), 'amplitude of each sinusoid', unit='rad', within=(-0.014, 0.014)
     )
     frequency: tuple[float, ...] = parameter(
         (REFERENCE_FREQUENCY,),
-        description='angular frequency of each sinusoid',
+        'angular frequency of each sinusoid',
         unit='rad/s',
-        lower=0.01,
-        upper=200.0,
+        within=(0.01, 200.0),
     )
     phase: tuple[float, ...] = parameter(
-        (0.0,),
-        description='phase of each sinusoid',
-        unit='rad',
-        lower=-2.0 * math.pi,
-        upper=2.0 * math.pi,
+        (0.0,), 'phase of each sinusoid', unit='rad', within=(-2.0 * math.pi, 2.0 * math.pi)
     )
 
 
@@ -56,15 +45,9 @@ class TiltSinusoids:
 class GapSinusoids(TiltSinusoids):
     """The same for the air gap y."""
 
-    offset: float = parameter(
-        0.025, description='mean position', unit='m', lower=0.018, upper=0.031
-    )
+    offset: float = parameter(0.025, 'mean position', unit='m', within=(0.018, 0.031))
     amplitude: tuple[float, ...] = parameter(
-        (0.0,),
-        description='amplitude of each sinusoid',
-        unit='m',
-        lower=-0.0065,
-        upper=0.0065,
+        (0.0,), 'amplitude of each sinusoid', unit='m', within=(-0.0065, 0.0065)
     )
 
 
@@ -72,13 +55,9 @@ class GapSinusoids(TiltSinusoids):
 class TravelSinusoids(TiltSinusoids):
     """The same for a displacement, x or z."""
 
-    offset: float = parameter(0.0, description='mean position', unit='m', lower=-0.05, upper=0.05)
+    offset: float = parameter(0.0, 'mean position', unit='m', within=(-0.05, 0.05))
     amplitude: tuple[float, ...] = parameter(
-        (0.0,),
-        description='amplitude of each sinusoid',
-        unit='m',
-        lower=-0.05,
-        upper=0.05,
+        (0.0,), 'amplitude of each sinusoid', unit='m', within=(-0.05, 0.05)
     )
 
 
@@ -106,26 +85,23 @@ class SinusoidParameters:
 class StepParameters:
     """A sequence of steps, each of one axis from start to target; the other axes stay at home."""
 
-    axis: tuple[str, ...] = parameter(('y',), description='the axis of each step', choices=AXES)
+    axis: tuple[str, ...] = parameter(('y',), 'the axis of each step', choices=AXES)
     start: tuple[float, ...] = parameter(
-        (0.02,), description='where each step begins', unit='m, rad', lower=-0.05, upper=0.05
+        (0.02,), 'where each step begins', unit='m, rad', within=(-0.05, 0.05)
     )
     target: tuple[float, ...] = parameter(
-        (0.027,), description='where each step ends', unit='m, rad', lower=-0.05, upper=0.05
+        (0.027,), 'where each step ends', unit='m, rad', within=(-0.05, 0.05)
     )
-    settle: float = parameter(
-        2.0, description='rest before each step', unit='s', lower=0.0, upper=60.0
-    )
-    shaped: bool = parameter(True, description='minimum-jerk steps; false: the reference jumps')
+    settle: float = parameter(2.0, 'rest before each step', unit='s', within=(0.0, 60.0))
+    shaped: bool = parameter(True, 'minimum-jerk steps; false: the reference jumps')
     shaping_time: float = parameter(
-        0.2, description='least time of a shaped step', unit='s', lower=0.01, upper=10.0
+        0.2, 'least time of a shaped step', unit='s', within=(0.01, 10.0)
     )
     acceleration: tuple[float, ...] = parameter(
         (5.0, 5.5, 5.5, 5.0, 20.0),
-        description='greatest acceleration of a shaped step; a longer way takes more time',
+        'greatest acceleration of a shaped step; a longer way takes more time',
         unit='m/s^2, rad/s^2',
-        lower=1e-3,
-        upper=1e3,
+        within=(1e-3, 1e3),
         length=5,
     )
 
@@ -138,9 +114,9 @@ class StepParameters:
 class CircleParameters:
     """A circle in x and z about home, begun at its greatest z."""
 
-    radius: float = parameter(0.03, description='its radius', unit='m', lower=1e-5, upper=0.05)
+    radius: float = parameter(0.03, 'its radius', unit='m', within=(1e-5, 0.05))
     frequency: float = parameter(
-        REFERENCE_FREQUENCY, description='angular frequency', unit='rad/s', lower=0.01, upper=200.0
+        REFERENCE_FREQUENCY, 'angular frequency', unit='rad/s', within=(0.01, 200.0)
     )
 
 
@@ -149,28 +125,18 @@ class HelixParameters:
     """A conical helix: circles in x and z about home while gap and radius go to and fro evenly."""
 
     radius: tuple[float, ...] = parameter(
-        (0.01, 0.03),
-        description='radius at one end and at the other',
-        unit='m',
-        lower=0.0,
-        upper=0.05,
-        length=2,
+        (0.01, 0.03), 'radius at one end and at the other', unit='m', within=(0.0, 0.05), length=2
     )
     gap: tuple[float, ...] = parameter(
         (0.022, 0.028),
-        description='air gap at one end and at the other',
+        'air gap at one end and at the other',
         unit='m',
-        lower=0.018,
-        upper=0.031,
+        within=(0.018, 0.031),
         length=2,
     )
-    turns: int = parameter(4, description='turns from one end to the other', lower=1, upper=1000)
+    turns: int = parameter(4, 'turns from one end to the other', within=(1, 1000))
     frequency: float = parameter(
-        REFERENCE_FREQUENCY,
-        description='angular frequency of the turns',
-        unit='rad/s',
-        lower=0.01,
-        upper=200.0,
+        REFERENCE_FREQUENCY, 'angular frequency of the turns', unit='rad/s', within=(0.01, 200.0)
     )
 
 
@@ -182,33 +148,23 @@ class LissajousParameters:
     """
 
     fundamental: float = parameter(
-        REFERENCE_FREQUENCY / 3.0,
-        description='angular frequency',
-        unit='rad/s',
-        lower=0.01,
-        upper=200.0,
+        REFERENCE_FREQUENCY / 3.0, 'angular frequency', unit='rad/s', within=(0.01, 200.0)
     )
     amplitude: tuple[float, ...] = parameter(
         (0.0, 0.03, 0.03, 0.0, 0.0),
-        description='amplitude of each output',
+        'amplitude of each output',
         unit='m, rad',
-        lower=-0.05,
-        upper=0.05,
+        within=(-0.05, 0.05),
         length=5,
     )
     multiple: tuple[int, ...] = parameter(
-        (1, 2, 3, 1, 1),
-        description='frequency of each output, in fundamentals',
-        lower=1,
-        upper=100,
-        length=5,
+        (1, 2, 3, 1, 1), 'frequency of each output, in fundamentals', within=(1, 100), length=5
     )
     phase: tuple[float, ...] = parameter(
         (0.0, 0.0, 0.0, 0.0, 0.0),
-        description='phase of each output',
+        'phase of each output',
         unit='rad',
-        lower=-2.0 * math.pi,
-        upper=2.0 * math.pi,
+        within=(-2.0 * math.pi, 2.0 * math.pi),
         length=5,
     )
 
@@ -222,42 +178,34 @@ class WaypointParameters:
     """
 
     y: tuple[float, ...] = parameter(
-        (0.025, 0.025), description='air gap at each point', unit='m', lower=-0.05, upper=0.05
+        (0.025, 0.025), 'air gap at each point', unit='m', within=(-0.05, 0.05)
     )
     x: tuple[float, ...] = parameter(
-        (-0.03, 0.03), description='x at each point', unit='m', lower=-0.05, upper=0.05
+        (-0.03, 0.03), 'x at each point', unit='m', within=(-0.05, 0.05)
     )
-    z: tuple[float, ...] = parameter(
-        (0.0, 0.0), description='z at each point', unit='m', lower=-0.05, upper=0.05
-    )
+    z: tuple[float, ...] = parameter((0.0, 0.0), 'z at each point', unit='m', within=(-0.05, 0.05))
     phi: tuple[float, ...] = parameter(
-        (0.0, 0.0), description='phi at each point', unit='rad', lower=-0.05, upper=0.05
+        (0.0, 0.0), 'phi at each point', unit='rad', within=(-0.05, 0.05)
     )
     theta: tuple[float, ...] = parameter(
-        (0.0, 0.0), description='theta at each point', unit='rad', lower=-0.05, upper=0.05
+        (0.0, 0.0), 'theta at each point', unit='rad', within=(-0.05, 0.05)
     )
     velocity: tuple[float, ...] = parameter(
         (0.05, 0.2, 0.2, 0.02, 0.1),
-        description='greatest speed of each output: y, x, z, phi, theta',
+        'greatest speed of each output: y, x, z, phi, theta',
         unit='m/s, rad/s',
-        lower=1e-4,
-        upper=10.0,
+        within=(1e-4, 10.0),
         length=5,
     )
     acceleration: tuple[float, ...] = parameter(
         (1.0, 2.0, 2.0, 0.5, 2.0),
-        description='greatest acceleration of each output: y, x, z, phi, theta',
+        'greatest acceleration of each output: y, x, z, phi, theta',
         unit='m/s^2, rad/s^2',
-        lower=1e-3,
-        upper=100.0,
+        within=(1e-3, 100.0),
         length=5,
     )
-    dwell: float = parameter(
-        0.5, description='rest at each point', unit='s', lower=0.0, upper=600.0
-    )
-    repeat: bool = parameter(
-        False, description='back to the first point and again; false: stay at the last'
-    )
+    dwell: float = parameter(0.5, 'rest at each point', unit='s', within=(0.0, 600.0))
+    repeat: bool = parameter(False, 'back to the first point and again; false: stay at the last')
 
     def points(self) -> tuple[tuple[float, ...], ...]:
         """The five arrays in output order."""
@@ -271,43 +219,35 @@ class WaypointParameters:
 class SquareParameters:
     """A rounded square in x and z about home, followed at constant speed, over and over."""
 
-    side: float = parameter(0.06, description='its side', unit='m', lower=1e-3, upper=0.1)
+    side: float = parameter(0.06, 'its side', unit='m', within=(1e-3, 0.1))
     corner: float = parameter(
         0.01,
-        description='smallest radius of curvature of a corner; speed^2 / corner is the greatest '
-        'acceleration',
+        'smallest radius of curvature of a corner; speed^2 / corner is the greatest acceleration',
         unit='m',
-        lower=1e-4,
-        upper=0.05,
+        within=(1e-4, 0.05),
     )
-    speed: float = parameter(
-        0.1, description='speed along the square', unit='m/s', lower=1e-4, upper=2.0
-    )
+    speed: float = parameter(0.1, 'speed along the square', unit='m/s', within=(1e-4, 2.0))
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class ChirpParameters:
     """A sinusoid of one output about home, its frequency rising or falling evenly."""
 
-    axis: str = parameter('x', description='the output', choices=AXES)
-    amplitude: float = parameter(
-        0.0005, description='amplitude', unit='m, rad', lower=-0.05, upper=0.05
-    )
+    axis: str = parameter('x', 'the output', choices=AXES)
+    amplitude: float = parameter(0.0005, 'amplitude', unit='m, rad', within=(-0.05, 0.05))
     frequency: tuple[float, ...] = parameter(
         (math.pi, 20.0 * math.pi),
-        description='angular frequency at the beginning and at the end',
+        'angular frequency at the beginning and at the end',
         unit='rad/s',
-        lower=0.01,
-        upper=1000.0,
+        within=(0.01, 1000.0),
         length=2,
     )
     time: float = parameter(
         60.0,
-        description='time of the sweep, rounded to whole half periods; '
-        'the frequencies before and after it are those of its ends',
+        'time of the sweep, rounded to whole half periods; the frequencies before and '
+        'after it are those of its ends',
         unit='s',
-        lower=0.1,
-        upper=36000.0,
+        within=(0.1, 36000.0),
     )
 
 
@@ -315,9 +255,7 @@ class ChirpParameters:
 class FileParameters:
     """A trajectory from a CSV file."""
 
-    path: str = parameter(
-        '', description='the file, absolute or from the folder the node was started in'
-    )
+    path: str = parameter('', 'the file, absolute or from the folder the node was started in')
     repeat: bool = parameter(
-        False, description='over and over; its last row is its first again. False: stay at the last'
+        False, 'over and over; its last row is its first again. False: stay at the last'
     )

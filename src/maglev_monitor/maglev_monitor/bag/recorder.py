@@ -42,10 +42,10 @@ _POLL_PERIOD = 0.05
 class RecorderParameters(NodeParameters):
     """The recorder's parameters."""
 
-    output: str = parameter('bag', description="the bag's folder, which must not exist yet")
-    compress: bool = parameter(True, description='compress the chunks of the bag with zstd')
+    output: str = parameter('bag', "the bag's folder, which must not exist yet")
+    compress: bool = parameter(True, 'compress the chunks of the bag with zstd')
     flush_period: float = parameter(
-        1.0, unit='s', lower=0.05, upper=60.0, description='what a kill can cost at most'
+        1.0, 'what a kill can cost at most', unit='s', within=(0.05, 60.0)
     )
 
 

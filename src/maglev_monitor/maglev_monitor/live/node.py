@@ -38,9 +38,9 @@ _POLL_PERIOD = 0.05
 class MonitorParameters(NodeParameters, WatchParameters):
     """The monitor's parameters."""
 
-    output: str = parameter('', description='file for metrics.json; empty: none')
+    output: str = parameter('', 'file for metrics.json; empty: none')
     exit_at_end: bool = parameter(
-        True, description='leave when the run has ended: 0 when it passed, 1 otherwise'
+        True, 'leave when the run has ended: 0 when it passed, 1 otherwise'
     )
 
 

@@ -26,13 +26,13 @@ class WatchParameters(RunParameters):
     """The parameters of a run, and how long it is waited for."""
 
     start_timeout: float = parameter(
-        60.0, unit='s', lower=0.0, description='longest wait for the run to begin; 0: for ever'
+        60.0, 'longest wait for the run to begin; 0: for ever', unit='s', lower=0.0
     )
     timeout: float = parameter(
-        10.0, unit='s', lower=0.1, description='longest silence of stage, controller or reference'
+        10.0, 'longest silence of stage, controller or reference', unit='s', lower=0.1
     )
     fault_grace: float = parameter(
-        3.0, unit='s', lower=0.0, description='how long a run is watched on after a fault'
+        3.0, 'how long a run is watched on after a fault', unit='s', lower=0.0
     )
 
 

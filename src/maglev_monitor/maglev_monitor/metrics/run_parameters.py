@@ -25,18 +25,16 @@ NOT_CHECKED = -1.0
 
 
 def _limit(description: str, unit: str = '') -> Any:
-    return parameter(
-        NOT_CHECKED, unit=unit, lower=-1.0, description=f'{description}; below 0: not checked'
-    )
+    return parameter(NOT_CHECKED, f'{description}; below 0: not checked', unit=unit, lower=-1.0)
 
 
 def _axis_limits(description: str) -> Any:
     return parameter(
         (NOT_CHECKED,) * 5,
+        f'{description}, for y, x, z, phi, theta; below 0: not checked',
         unit='m, m, m, rad, rad',
         lower=-1.0,
         length=5,
-        description=f'{description}, for y, x, z, phi, theta; below 0: not checked',
     )
 
 
@@ -45,29 +43,27 @@ class MetricsParameters:
     """How the metrics are computed."""
 
     sample_time: float = parameter(
-        1e-3, unit='s', lower=1e-5, upper=1.0, description='stage time from sample to sample'
+        1e-3, 'stage time from sample to sample', unit='s', within=(1e-5, 1.0)
     )
     peak_current: float = parameter(
-        7.0, unit='A', lower=0.0, upper=100.0, description="the amplifiers' peak, for the report"
+        7.0, "the amplifiers' peak, for the report", unit='A', within=(0.0, 100.0)
     )
     continuous_current: float = parameter(
-        5.0, unit='A', lower=0.0, upper=100.0, description="the amplifiers' rating, for the report"
+        5.0, "the amplifiers' rating, for the report", unit='A', within=(0.0, 100.0)
     )
     settling_bound: tuple[float, ...] = parameter(
         (1e-4, 1e-4, 1e-4, 1e-4, 1e-4),
+        't_s counts until |e| stays within this, for y, x, z, phi, theta',
         unit='m, m, m, rad, rad',
-        lower=1e-9,
-        upper=1.0,
+        within=(1e-9, 1.0),
         length=5,
-        description='t_s counts until |e| stays within this, for y, x, z, phi, theta',
     )
     encoder_bound: tuple[float, ...] = parameter(
         (1e-5, 1e-5, 1e-5, 2e-5, 2e-5),
+        't_enc counts until |e| stays within this, for y, x, z, phi, theta',
         unit='m, m, m, rad, rad',
-        lower=1e-9,
-        upper=1.0,
+        within=(1e-9, 1.0),
         length=5,
-        description='t_enc counts until |e| stays within this, for y, x, z, phi, theta',
     )
 
 
@@ -83,22 +79,22 @@ class RunLimits:
     max_phase_current: float = _limit('peak of any phase current', 'A')
     min_real_time_factor: float = _limit('stage time over wall time')
     max_missing_samples: int = parameter(
-        0, lower=-1, description='samples lost on any topic; below 0: not checked'
+        0, 'samples lost on any topic; below 0: not checked', lower=-1
     )
     max_late_samples: int = parameter(
-        -1, lower=-1, description='samples with late currents; below 0: not checked'
+        -1, 'samples with late currents; below 0: not checked', lower=-1
     )
-    min_samples: int = parameter(0, lower=0, description='samples that must have been measured')
-    min_steps: int = parameter(0, lower=0, description='steps that must have been measured')
+    min_samples: int = parameter(0, 'samples that must have been measured', lower=0)
+    min_steps: int = parameter(0, 'steps that must have been measured', lower=0)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class RunParameters:
     """What a run is called, its machine, how it is measured and what it must keep."""
 
-    scenario: str = parameter('', description='name of the scenario, for the metrics')
-    stage: str = parameter('', description='the stage that runs: plant or hw_bridge')
-    mode: str = parameter('', description='lockstep or realtime')
+    scenario: str = parameter('', 'name of the scenario, for the metrics')
+    stage: str = parameter('', 'the stage that runs: plant or hw_bridge')
+    mode: str = parameter('', 'lockstep or realtime')
     machine: MachineParameters = group(MachineParameters)
     metrics: MetricsParameters = group(MetricsParameters)
     limits: RunLimits = group(RunLimits)
