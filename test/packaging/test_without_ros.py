@@ -95,6 +95,10 @@ def test_pip_installs_the_packages_and_six_lines_fly_the_ellipse(
     )
 
 
+def test_the_readme_shows_these_lines() -> None:
+    assert SIX_LINES.strip() in (ROOT / 'README.md').read_text(encoding='utf-8')
+
+
 def test_the_hook_would_see_ros(python: Path, tmp_path: Path) -> None:
     for name in ('rclpy', 'std_msgs.msg', 'maglev_msgs', 'rcl_interfaces'):
         told = run([python, '-c', f'{NO_ROS}import {name}'], tmp_path, 60.0)
