@@ -85,6 +85,7 @@ def test_pip_installs_the_packages_and_six_lines_fly_the_ellipse(
         )
     pip = [sys.executable, '-I', '-m', 'pip', '--python', python, '--isolated', 'install']
     offline = ['--no-index', '--no-deps', '--no-build-isolation', '--no-compile', '--quiet']
+    offline.append('--use-pep517')  # which an older pip does not take by itself
     folders = [tmp_path / package for package in PURE]
     installed = run([*pip, *offline, *folders], tmp_path, 300.0)
     assert installed.returncode == 0, installed.stderr
