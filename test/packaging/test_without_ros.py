@@ -85,6 +85,7 @@ def test_pip_installs_the_packages_and_six_lines_fly_the_ellipse(
         )
     pip = [sys.executable, '-I', '-m', 'pip', '--python', python, '--isolated', 'install']
     offline = ['--no-index', '--no-deps', '--no-build-isolation', '--no-compile', '--quiet']
+    offline.append('--use-pep517')  # which an older pip does not take by itself
     folders = [tmp_path / package for package in PURE]
     installed = run([*pip, *offline, *folders], tmp_path, 300.0)
     assert installed.returncode == 0, installed.stderr
@@ -93,6 +94,10 @@ def test_pip_installs_the_packages_and_six_lines_fly_the_ellipse(
     assert re.fullmatch(
         r'y: 1\.[45]\d\nx: 1\.[45]\d\nz: 1\.[45]\d\nphi: 0\.00\ntheta: 0\.00\n', flown.stdout
     )
+
+
+def test_the_readme_shows_these_lines() -> None:
+    assert SIX_LINES.strip() in (ROOT / 'README.md').read_text(encoding='utf-8')
 
 
 def test_the_hook_would_see_ros(python: Path, tmp_path: Path) -> None:

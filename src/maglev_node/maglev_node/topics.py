@@ -40,8 +40,11 @@ def sample_qos(depth: int = 16384) -> QoSProfile:
     )
 
 
-def reference_qos(depth: int = 1024) -> QoSProfile:
-    """Of the reference: the last ``depth`` samples are kept for a controller that joins late."""
+def reference_qos(depth: int = 16384) -> QoSProfile:
+    """As :func:`sample_qos`, but the last ``depth`` samples are kept for a controller to come.
+
+    The reference may see the controller before that sees the reference.
+    """
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
         depth=depth,

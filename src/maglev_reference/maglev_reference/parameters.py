@@ -159,7 +159,9 @@ class ReferenceParameters:
         0.001, 'time from one sample to the next', unit='s', within=(1e-4, 0.01)
     )
     trajectory: str = parameter(
-        'sinusoids', 'what is followed while measured', choices=TRAJECTORIES
+        'sinusoids',
+        f'what is followed while measured: {", ".join(TRAJECTORIES)}, '
+        'or the dotted path of a module',
     )
     duration: float = parameter(
         60.0,
@@ -206,6 +208,14 @@ class ReferenceParameters:
     z: AxisLoopParameters = group(AxisLoopParameters)
     phi: AxisLoopParameters = group(AxisLoopParameters)
     theta: AxisLoopParameters = group(AxisLoopParameters)
+
+    def __post_init__(self) -> None:
+        """Refuse a trajectory that is none of ours and no path of a module."""
+        if '.' not in self.trajectory and self.trajectory not in TRAJECTORIES:
+            raise ParameterError(
+                f"parameter 'trajectory' is '{self.trajectory}', it must be one of "
+                f'{", ".join(TRAJECTORIES)}, or the dotted path of a module'
+            )
 
     @property
     def loops(self) -> tuple[AxisLoopParameters, ...]:

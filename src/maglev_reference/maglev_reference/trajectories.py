@@ -8,6 +8,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from maglev_model.axes import AXES, UNITS, FloatArray
+from maglev_model.plugins import find_plugin
 from maglev_model.quintic import minimum_jerk_time
 from maglev_reference.check import UnreachableError
 from maglev_reference.curves import Chirp, Helix, Sinusoids, Square
@@ -53,7 +54,7 @@ class Passing(Motion, Protocol):
 
 
 def course(parameters: ReferenceParameters) -> Course:
-    """The course of ``trajectory``, which is not ``steps``.
+    """The course of ``trajectory``, which is not ``steps``; of a dotted path, its ``course``.
 
     Raises ParameterError for what cannot be built: a file that is not as it must be, corners
     larger than their square.
@@ -83,8 +84,12 @@ def course(parameters: ReferenceParameters) -> Course:
             lines: list[tuple[float, ...]] = [()] * 5
             lines[chirp.axis] = parameters.chirp.frequency
             return Course(chirp, length=chirp.length, lines=tuple(lines))
-        case _:
+        case 'hold':
             return Course(Stand(home))
+        case name:
+            module = find_plugin('trajectory', name, ('course',))
+            own_course: Course = module.course(parameters)
+            return own_course
 
 
 def _lined(sinusoids: Sinusoids) -> Course:

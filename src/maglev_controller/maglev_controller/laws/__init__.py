@@ -22,14 +22,12 @@ To add another:
 from __future__ import annotations
 
 import dataclasses
-import importlib
-import pkgutil
 from collections.abc import Callable
 
 from maglev_controller.checks import check_machine
 from maglev_controller.design.axis_design import AxisDesign
 from maglev_controller.parameters import ControllerParameters
-from maglev_model.parameters import ParameterError
+from maglev_model.plugins import find_plugin, names_in
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,7 +42,7 @@ class ControlLaw:
 
 def law_names() -> tuple[str, ...]:
     """The laws of this folder, by name."""
-    return tuple(sorted(module.name for module in pkgutil.iter_modules(__path__)))
+    return names_in(__name__)
 
 
 def find_law(name: str) -> ControlLaw:
@@ -52,20 +50,7 @@ def find_law(name: str) -> ControlLaw:
 
     Raises :class:`ParameterError` when there is none, or when its module cannot be used.
     """
-    given = f"parameter 'law' is '{name}'"
-    if '.' not in name and name not in law_names():
-        raise ParameterError(
-            f'{given}, it must be one of {", ".join(law_names())}, or the dotted path of a module'
-        )
-    try:
-        module = importlib.import_module(name if '.' in name else f'{__name__}.{name}')
-    except Exception as error:
-        raise ParameterError(
-            f'{given}, which cannot be imported: {type(error).__name__}: {error}'
-        ) from error
-    for function in ('check', 'design'):
-        if not callable(getattr(module, function, None)):
-            raise ParameterError(f"{given}, a module without the function '{function}' of a law")
+    module = find_plugin('law', name, ('check', 'design'), __name__)
     return ControlLaw(
         check=module.check,
         design=module.design,

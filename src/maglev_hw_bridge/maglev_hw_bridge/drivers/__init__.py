@@ -6,15 +6,13 @@ a :class:`Driver`; the parameter ``driver`` names it.
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_model.parameters import ParameterError
+from maglev_model.plugins import find_plugin
 
 CountArray = NDArray[np.int32]
 VoltArray = NDArray[np.float64]
@@ -81,11 +79,6 @@ class Truthful(Protocol):
 
 def make_driver(parameters: BridgeParameters, realtime: bool) -> Driver:
     """The driver that ``driver`` names. Raises ParameterError when there is none of that name."""
-    known = sorted(module.name for module in pkgutil.iter_modules(__path__))
-    if parameters.driver not in known:
-        raise ParameterError(
-            f"parameter 'driver' is '{parameters.driver}', it must be one of {', '.join(known)}"
-        )
-    module = importlib.import_module(f'{__name__}.{parameters.driver}')
+    module = find_plugin('driver', parameters.driver, ('make',), __name__)
     driver: Driver = module.make(parameters, realtime)
     return driver

@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import copy
 import itertools
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from maglev_model.axes import AXES
 from maglev_model.phases import Phase
+from maglev_model.plugins import find_plugin
 from maglev_monitor.metrics.decoding import TOPIC_TYPES, Records
 from maglev_monitor.metrics.derived import SOURCES, phase_currents, positions
 from maglev_monitor.metrics.faults import Faults, Instant
@@ -33,6 +35,22 @@ _OPTIONAL = ('controller', 'plant')  # a stage or controller may do without
 _TICK_RESOLUTION = 1e-6  # of the tick histogram [s]
 _TICK_BINS = 200_000
 _RUNNING = (Phase.LIFT_OFF, Phase.HOLD, Phase.TRACK, Phase.STEP, Phase.LAND)
+
+
+class Metric(Protocol):
+    """A further metric, as the function ``metric(run)`` of a module makes it.
+
+    ``metrics.modules`` names the module; what it finds is ``further.MODULE`` of metrics.json.
+    """
+
+    def add(self, rows: Records, position: FloatArray) -> None:
+        """Take the run's next rows (n,) of :data:`.joiner.ROW`, in order.
+
+        ``position`` (n, 2, 5): true and measured outputs [m, rad], NaN where unknown.
+        """
+
+    def result(self) -> Mapping[str, float | None]:
+        """Its figures by name, in SI units."""
 
 
 class RunMetrics:
@@ -55,6 +73,10 @@ class RunMetrics:
         self._target: FloatArray | None = None
         self._step: StepTracker | None = None
         self._currents = _Currents(run.machine.pole_pitch)
+        self._further: dict[str, Metric] = {
+            name: find_plugin('metrics.modules', name, ('metric',)).metric(run)
+            for name in run.metrics.modules
+        }
         self._timing = _Timing()
         self._faults = Faults()
         self._end: Instant | None = None
@@ -117,6 +139,8 @@ class RunMetrics:
             'timing': self._timing.result(sample_time),
             'faults': self._faults.until(self._end, sample_time),
         }
+        if self._further:
+            figures['further'] = {name: one.result() for name, one in self._further.items()}
         return {**figures, **verdict(figures, run.limits, complete=self.ended)}
 
     def _missing_result(self) -> dict[str, Any]:
@@ -161,6 +185,8 @@ class RunMetrics:
         tracked = referenced & (phases == Phase.TRACK)
         self._tracking.add(position[tracked] - rows['reference'][tracked][:, None, :])
         self._add_segments(rows[referenced], position[referenced])
+        for metric in self._further.values():
+            metric.add(rows, position)
         self._currents.add(rows)
         self._timing.add(rows)
 

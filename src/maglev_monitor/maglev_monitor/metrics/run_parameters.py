@@ -65,6 +65,9 @@ class MetricsParameters:
         within=(1e-9, 1.0),
         length=5,
     )
+    modules: tuple[str, ...] = parameter(
+        (), 'further metrics: dotted paths of modules with a function metric(run)'
+    )
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -79,6 +79,9 @@ def _other_lines(figures: Mapping[str, Any]) -> Iterator[str]:
             f' {timing["tick_p50"] * 1e6:.0f} µs median, {timing["tick_p99"] * 1e6:.0f} µs p99,'
             f' {timing["late_samples"]} samples late'
         )
+    for name, further in figures.get('further', {}).items():
+        shown = ', '.join(f'{key} {"–" if v is None else number(v)}' for key, v in further.items())
+        yield f'  {name}: {shown}'
     missing = ', '.join(
         f'{count} {key}' for key, count in figures['missing_by_topic'].items() if count
     )
