@@ -10,9 +10,6 @@ from rclpy.qos import QoSProfile
 
 from maglev_node.topics import sample_qos
 
-POLL_PERIOD = 0.02
-"""How often those who only watch look at their queues [s]."""
-
 
 class PollingNode(Node):
     """A node with queues that the middleware fills and the node empties when it likes.

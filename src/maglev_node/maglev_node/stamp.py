@@ -15,11 +15,6 @@ def nanoseconds(stamp: Time) -> int:
     return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
 
 
-def seconds(stamp: Time) -> float:
-    """A stamp as seconds since the epoch."""
-    return float(stamp.sec) + float(stamp.nanosec) * 1e-9
-
-
 def copy_stamp(source: Time, target: Time) -> None:
     """Give one message the stamp of another."""
     target.sec, target.nanosec = source.sec, source.nanosec

@@ -21,7 +21,7 @@ from maglev_node import topics
 from maglev_node.node import MaglevNode, NodeError, NodeParameters
 from maglev_node.polling import PolledSubscription
 from maglev_node.process import main as run_main
-from maglev_node.stamp import seconds
+from maglev_node.stamp import nanoseconds
 
 KEYS = {
     topics.REFERENCE: 'reference',
@@ -151,7 +151,7 @@ class MonitorNode(MaglevNode[MonitorParameters]):
         for status in message.status:
             if status.level[0] < FAULT_LEVEL or status.name == self.get_name() or self._concluded:
                 continue
-            stamp = round(seconds(message.header.stamp) * 1e9)
+            stamp = nanoseconds(message.header.stamp)
             if self._watch.add_fault(stamp, status.name, status.message, time.monotonic()):
                 self.get_logger().error(f'fault in {status.name}: {status.message}')
 
