@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from flight import LONG, LOWER_STOP, airborne, fly, gap, landed_without_current
 from graph import Nodes, Observer
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 
 from maglev_msgs.msg import ControllerState, Reference
 from maglev_node.topics import CONTROLLER_STATE, CURRENTS, MEASUREMENT, REFERENCE, TRUE_STATE
@@ -87,6 +89,13 @@ def test_off_the_lower_stop_a_lift_off_is_refused(nodes: Nodes, watching: Observ
     assert 'not on its lower stop' in answer.message
     samples(watching, 30)
     assert phase(watching) == Reference.END
+    client = watching.node.create_client(ChangeState, '/plant/change_state')
+    for name in ('deactivate', 'cleanup', 'configure', 'activate'):  # a new platen, so to speak
+        request = ChangeState.Request(transition=Transition(label=name))
+        assert watching.ask(client, request).success, name
+    watching.wait(lambda: phase(watching) == Reference.REST)
+    assert watching.call('/reference/lift_off').success
+    watching.wait(lambda: airborne(watching))
 
 
 @pytest.mark.parametrize('name', ['controller', 'reference'])
