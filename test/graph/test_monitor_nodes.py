@@ -235,10 +235,9 @@ def test_a_fault_of_another_stage_is_none_of_this_run(nodes: Nodes, feeder: Feed
 
 
 def test_a_monitor_alone_claims_nothing_of_others_and_says_what_to_look_at(nodes: Nodes) -> None:
-    started = time.monotonic()
-    monitor = start_monitor(nodes, 'start_timeout:=7.0')
+    monitor = start_monitor(nodes, 'start_timeout:=5.0')
     monitor.wait_for('no node of the run is seen on domain')
-    assert time.monotonic() - started < 8.0  # five and what it takes to start
+    assert '[WARN]' in monitor.output  # before it gives up
     for words in ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'loopback', 'VPN', 'firewall'):
         assert words in monitor.output
     assert monitor.wait() == 1

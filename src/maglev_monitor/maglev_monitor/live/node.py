@@ -142,7 +142,8 @@ class MonitorNode(MaglevNode[MonitorParameters]):
         """Say early when discovery does not work, which nothing else would tell."""
         here, itself = self.get_namespace(), self.get_name()
         known = self.get_node_names_and_namespaces()
-        self._discovery.update([name for name, where in known if where == here and name != itself])
+        others = {name for name, where in known if where == here} - {itself}
+        self._discovery.update({name for name in others if not name.startswith('_')})  # ros2cli's
         warning = self._discovery.warning(now)
         if warning:
             self.get_logger().warning(warning)
