@@ -19,7 +19,7 @@ from scipy.integrate import solve_ivp
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
 from maglev_model.compiled import compiled
-from maglev_model.machine import machine_from_array
+from maglev_model.machine_array import machine_from_array
 from maglev_model.parameters import build, read_yaml
 from maglev_model.records import Block
 from maglev_plant.arrays import StageArrays

@@ -97,7 +97,7 @@ class Run:
         clean = True
         for node in STOP_ORDER:
             code = self._nodes[node].code
-            if node != 'monitor' and code not in (0, 130):
+            if node != 'monitor' and code != 0:
                 words = self._last_words(node)
                 self._complain(f'failed: {node} did not end cleanly, exit code {code}{words}')
                 clean = False

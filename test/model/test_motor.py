@@ -10,13 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from maglev_model import motor
-from maglev_model.machine import (
-    Machine,
-    MachineParameters,
-    machine_constants,
-    machine_from_array,
-    machine_to_array,
-)
+from maglev_model.machine import Machine, MachineParameters, machine_constants
+from maglev_model.machine_array import machine_from_array, machine_to_array
 from maglev_model.parameters import ParameterError, build
 
 MACHINE = machine_constants(MachineParameters())

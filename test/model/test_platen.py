@@ -10,16 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from maglev_model.geometry import motor_gaps, outputs_of_gaps
 from maglev_model.machine import MachineParameters, machine_constants
 from maglev_model.motor import L_h, L_v1, L_v2, L_v3, horizontal_force, vertical_force
-from maglev_model.platen import (
-    accelerations,
-    affine_terms,
-    gaps_from_outputs,
-    motor_gaps,
-    outputs_from_gaps,
-    outputs_of_gaps,
-)
+from maglev_model.platen import accelerations, affine_terms, gaps_from_outputs, outputs_from_gaps
 
 M = machine_constants(MachineParameters())
 OUTPUTS = st.tuples(

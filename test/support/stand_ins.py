@@ -27,7 +27,7 @@ for file in "$tree/behaviour/$name@${out##*/}" "$tree/behaviour/$name"; do
   [[ ! -f $file || -n $what ]] || read -r what <"$file" || true
 done
 ended() { echo "$name" >>"$tree/ended"; exit "$1"; }
-trap 'ended 130' INT
+trap 'ended 0' INT
 trap 'ended 143' TERM
 echo $$ >"$tree/pids/$name" # from now on it can be told to end
 case $what in

@@ -39,7 +39,8 @@ from maglev_controller.sample_step import (
     answer_sample,
 )
 from maglev_model.axes import AXES, FloatArray
-from maglev_model.machine import machine_constants, machine_to_array
+from maglev_model.machine import machine_constants
+from maglev_model.machine_array import machine_to_array
 
 FADING_TIME = 0.05
 """Time constant of the bump, the part of w that bridges a change of gains in flight [s]."""

@@ -24,7 +24,8 @@ from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
 from maglev_model.equilibrium import equilibrium_inverse
 from maglev_model.inverse import CurrentLimits, exact_inverse, simplified_inverse
-from maglev_model.machine import Machine, machine_from_array
+from maglev_model.machine import Machine
+from maglev_model.machine_array import machine_from_array
 from maglev_model.platen import outputs_from_gaps
 from maglev_model.quintic import quintic_to_zero, transition_time
 

@@ -13,7 +13,8 @@ from typing import Annotated, Final
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
-from maglev_model.machine import MachineArray, machine_constants, machine_from_array
+from maglev_model.machine import machine_constants
+from maglev_model.machine_array import MachineArray, machine_from_array
 from maglev_model.motor import attraction_coefficients
 from maglev_model.platen import outputs_from_gaps
 from maglev_model.records import Block, Record

@@ -15,12 +15,8 @@ from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
 from maglev_model.inverse import CurrentLimits, exact_inverse
-from maglev_model.machine import (
-    Machine,
-    MachineArray,
-    machine_constants,
-    machine_from_array,
-)
+from maglev_model.machine import Machine, machine_constants
+from maglev_model.machine_array import MachineArray, machine_from_array
 from maglev_model.platen import output_accelerations
 from maglev_model.quintic import braking_times, quintic_to_zero
 from maglev_model.records import Block, Record

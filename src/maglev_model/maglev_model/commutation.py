@@ -9,9 +9,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
 from maglev_model.machine import Machine
 
@@ -19,7 +16,6 @@ SCALES = {'amplitude': 1.0, 'rms': math.sqrt(2.0)}
 """``scale`` by the name of the convention."""
 
 _SIN_120 = math.sqrt(3.0) / 2.0
-_PHASE_SHIFTS = np.array([0.0, 2.0, 4.0]) * np.pi / 3.0
 
 
 @compiled
@@ -51,23 +47,3 @@ def direct_quadrature_currents(
     alpha = (2.0 * i_a - i_b - i_c) / (3.0 * scale)
     beta = (i_b - i_c) / (2.0 * _SIN_120 * scale)
     return alpha * cos + beta * sin, beta * cos - alpha * sin
-
-
-def motor_phase_currents(
-    direct_current: FloatArray,
-    quadrature_current: FloatArray,
-    x: FloatArray,
-    z: FloatArray,
-    pole_pitch: float,
-) -> FloatArray:
-    """Currents of the three phases of motors 1..4, shape (n, 4, 3) [A]: inverse Park, amplitudes.
-
-    ``direct_current``, ``quadrature_current`` (n, 4) [A]; ``x``, ``z`` (n,) and ``pole_pitch`` tau
-    in [m].
-    """
-    displacement = np.stack([z, x, z, x], axis=1)
-    angle = (np.pi / pole_pitch * displacement)[:, :, None] - _PHASE_SHIFTS
-    currents: FloatArray = direct_current[:, :, None] * np.cos(angle) - quadrature_current[
-        :, :, None
-    ] * np.sin(angle)
-    return currents

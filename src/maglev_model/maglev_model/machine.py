@@ -10,13 +10,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import Annotated, Final, NamedTuple
+from typing import NamedTuple
 
-import numpy as np
-from numba.np.unsafe.ndarray import to_fixed_tuple
-from numpy.typing import NDArray
-
-from maglev_model.compiled import compiled
 from maglev_model.parameters import ParameterError, parameter
 
 VACUUM_PERMEABILITY = 4e-7 * math.pi
@@ -195,20 +190,3 @@ def machine_constants(parameters: MachineParameters) -> Machine:
         G=p.gravity,
         motors=float(p.motors),
     )
-
-
-FIELDS: Final = len(Machine._fields)
-
-MachineArray = Annotated[NDArray[np.float64], FIELDS]
-"""A field of a record that holds the constants."""
-
-
-def machine_to_array(machine: Machine) -> NDArray[np.float64]:
-    """The constants in one array, shape (25,), for :func:`machine_from_array`."""
-    return np.array(machine, dtype=np.float64)
-
-
-@compiled
-def machine_from_array(array: NDArray[np.float64]) -> Machine:
-    """The :class:`Machine` in an array; an array is the cheaper argument for calls from Python."""
-    return Machine(*to_fixed_tuple(array, FIELDS))

@@ -9,9 +9,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from maglev_model.axes import PHI, THETA, FloatArray, X, Y, Z
+from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
 from maglev_model.machine import Machine
 from maglev_model.motor import force_coefficients
@@ -49,35 +47,6 @@ def outputs_from_gaps(
     output[3] = math.asin(sin_phi) if abs(sin_phi) <= 1.0 else math.nan
     output[4] = math.asin(sin_theta) if abs(sin_theta) <= 1.0 else math.nan
     return float(gap[0] + gap[2] - gap[1] - gap[3])
-
-
-def motor_gaps(outputs: FloatArray, radius: float) -> FloatArray:
-    """Air gaps g_1..g_4 [m], shape (..., 4), from outputs (..., 5) [m, rad], by (5).
-
-    ``radius`` is r, from the centre of the platen to the centre of a mover [m].
-    """
-    gap = outputs[..., Y]
-    tilt_phi = radius * np.sin(outputs[..., PHI])
-    tilt_theta = radius * np.sin(outputs[..., THETA])
-    return np.stack((gap - tilt_phi, gap + tilt_theta, gap + tilt_phi, gap - tilt_theta), axis=-1)
-
-
-def outputs_of_gaps(
-    gap: FloatArray, x: FloatArray | float, z: FloatArray | float, radius: float
-) -> FloatArray:
-    """Outputs y, x, z, phi, theta, shape (..., 5) [m, rad], from what encoders read: (5) inverted.
-
-    ``gap`` (..., 4), ``x``, ``z`` (...) and ``radius`` r in [m]; y is the mean of the gaps. Gaps
-    that no tilt can make give NaN tilts.
-    """
-    found = np.empty((*gap.shape[:-1], 5))
-    found[..., Y] = gap.mean(axis=-1)
-    found[..., X] = x
-    found[..., Z] = z
-    sines = (gap[..., (2, 1)] - gap[..., (0, 3)]) / (2.0 * radius)
-    with np.errstate(invalid='ignore'):
-        found[..., PHI:] = np.arcsin(sines)
-    return found
 
 
 @compiled

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from maglev_model.axes import FloatArray
 from maglev_model.commutation import SCALES
-from maglev_model.machine import Machine, MachineArray, machine_constants
+from maglev_model.machine import Machine, machine_constants
+from maglev_model.machine_array import MachineArray
 from maglev_model.records import Record
 from maglev_plant.parameters import PlantParameters
 

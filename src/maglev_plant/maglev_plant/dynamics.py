@@ -8,7 +8,8 @@ import numpy as np
 
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
-from maglev_model.machine import Machine, machine_from_array
+from maglev_model.machine import Machine
+from maglev_model.machine_array import machine_from_array
 from maglev_model.platen import output_accelerations
 from maglev_model.records import Block
 from maglev_plant.amplifier import set_targets

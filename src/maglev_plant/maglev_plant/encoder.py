@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from maglev_model.compiled import compiled
-from maglev_model.machine import machine_from_array
+from maglev_model.machine_array import machine_from_array
 from maglev_model.records import Block
 from maglev_plant.arrays import StageArrays
 

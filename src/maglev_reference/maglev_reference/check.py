@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from maglev_model.axes import AXES, UNITS, FloatArray, Y
+from maglev_model.geometry import motor_gaps
 from maglev_model.parameters import ParameterError
-from maglev_model.platen import motor_gaps
 from maglev_reference.motion import Kinematics
 from maglev_reference.parameters import ReferenceParameters
 

@@ -12,10 +12,10 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import Trigger
 
 from maglev_model.axes import FloatArray
+from maglev_model.geometry import outputs_of_gaps
 from maglev_model.modes import Mode
 from maglev_model.parameters import parameter
 from maglev_model.phases import Phase
-from maglev_model.platen import outputs_of_gaps
 from maglev_msgs.msg import ControllerState, Measurement, Reference
 from maglev_node.graph_guard import GraphGuard, Watchers
 from maglev_node.mode_check import mode_conflict

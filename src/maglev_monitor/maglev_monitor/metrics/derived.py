@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from maglev_model.commutation import motor_phase_currents
-from maglev_model.platen import outputs_of_gaps
+from maglev_model.geometry import motor_phase_currents, outputs_of_gaps
 from maglev_monitor.metrics.decoding import Records
 
 FloatArray = NDArray[np.float64]
