@@ -375,17 +375,8 @@ def _all_currents(
 ) -> None:
     controlled, realised, excess = np.ones(5), np.empty(5), np.empty(2)
     for k in range(outputs.shape[0]):
-        limited_by = exact_inverse(
-            machine,
-            limits,
-            controlled,
-            outputs[k],
-            wanted[k],
-            direct[k],
-            quadrature[k],
-            realised,
-            excess,
-        )
+        answer = direct[k], quadrature[k], realised, excess
+        limited_by = exact_inverse(machine, limits, controlled, outputs[k], wanted[k], *answer)
         possible[k] = limited_by == 0
 
 
@@ -401,13 +392,7 @@ def exact_currents(
     n = len(outputs)
     direct, quadrature = np.empty((n, 4)), np.empty((n, 4))
     possible = np.empty(n, dtype=np.bool_)
-    _all_currents(
-        machine,
-        limits,
-        np.ascontiguousarray(outputs, dtype=np.float64),
-        np.ascontiguousarray(wanted, dtype=np.float64),
-        direct,
-        quadrature,
-        possible,
-    )
+    outputs = np.ascontiguousarray(outputs, dtype=np.float64)
+    wanted = np.ascontiguousarray(wanted, dtype=np.float64)
+    _all_currents(machine, limits, outputs, wanted, direct, quadrature, possible)
     return direct, quadrature, possible
