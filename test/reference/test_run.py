@@ -30,7 +30,7 @@ def run_at(sequence, autostart=True, lead=64):
     run = ReferenceRun(PARAMETERS, lead, autostart)
     assert run.observe(sequence)
     assert run.due() is None
-    run.start(REST)
+    run.start(run.plan(REST))
     run.observe_controller(Mode.WAITING, sequence)
     return run
 
@@ -88,7 +88,7 @@ def test_another_stage_is_waited_for_anew_but_not_while_the_platen_flies():
     assert (run.newest, run.started, run.autostart, run.phase) == (3, False, False, Phase.REST)
     assert not run.lift_off(REST)
     assert not run.land()
-    run.start(REST)
+    run.start(run.plan(REST))
     first, block = run.due()
     assert first == 3
     assert (block.phase == Phase.REST).all()
@@ -100,16 +100,16 @@ def test_a_start_from_elsewhere_is_refused_and_may_be_tried_again():
     run = ReferenceRun(PARAMETERS, 64, True)
     run.observe(7)
     with pytest.raises(UnreachableError, match='lower stop'):
-        run.start(np.array([0.025, 0.0, 0.0, 0.0, 0.0]))
+        run.plan(np.array([0.025, 0.0, 0.0, 0.0, 0.0]))
     assert not run.started
-    run.start(REST)
+    run.start(run.plan(REST))
     assert run.started
 
 
 def test_nothing_beyond_rest_before_a_controller_was_seen():
     run = ReferenceRun(PARAMETERS, 400, True)
     run.observe(10)
-    run.start(REST)
+    run.start(run.plan(REST))
     published = np.concatenate([run.due()[1].phase for _ in range(2)])
     rest = round(PARAMETERS.lift_off.wait / PARAMETERS.sample_time)
     assert len(published) == rest
@@ -200,3 +200,16 @@ def test_slowly_is_what_the_newest_sample_waits_for():
     assert (first, len(block.phase)) == (0, 1)
     assert run.due(slowly=True) is None
     assert len(run.due()[1].phase) == 63
+
+
+def test_the_stage_goes_on_while_the_timeline_is_made():
+    run = ReferenceRun(PARAMETERS, 64, True)
+    run.observe(0)
+    timeline = run.plan(REST)
+    run.observe(1000)
+    run.start(timeline)
+    run.observe_controller(Mode.WAITING, 1000)
+    assert run.give_way() == ''
+    first, block = run.due()
+    assert first == 1000
+    assert (block.phase == Phase.REST).all()

@@ -114,10 +114,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         """Take what is new, and publish what is due."""
         for state, _ in self._states.take(1):
             self._run.observe_controller(Mode(state.mode), int(state.sequence))
-        news = False
-        for message, _ in self._measurements.take(1):
-            if self._run.observe(int(message.sequence)) and self._in_one_mode(message):
-                news, self._measured, self._seen = True, message, time.monotonic()
+        news = self._take_measurement()
         if not self._run.started:
             self._wait(news)
         elif not news:
@@ -126,6 +123,14 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
             self._give_way()
             self._publish()
             self._follow_phase()
+
+    def _take_measurement(self) -> bool:
+        """Take the newest measurement; false when there is none, or one to be left alone."""
+        news = False
+        for message, _ in self._measurements.take(1):
+            if self._run.observe(int(message.sequence)) and self._in_one_mode(message):
+                news, self._measured, self._seen = True, message, time.monotonic()
+        return news
 
     def _in_one_mode(self, message: Measurement) -> bool:
         """Whether the stage runs in our mode; in flight no other one can come."""
@@ -165,14 +170,19 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
     def _start(self) -> None:
         if not self._graph.alone():
             return
+        autostart = self._run.autostart
         try:
-            self._run.start(self._position())
+            timeline = self._run.plan(self._position())
         except UnreachableError as error:
             self._refuse(str(error))
-        else:
-            self._reminded = time.monotonic()
-            start = 'starting' if self._run.autostart else 'resting until ~/lift_off'
-            self.get_logger().info(f'{start} at sample {self._run.newest}')
+            return
+        self._take_measurement()
+        if self._run.autostart != autostart:  # the stage began anew in the meantime
+            return
+        self._run.start(timeline)
+        self._reminded = time.monotonic()
+        start = 'starting' if autostart else 'resting until ~/lift_off'
+        self.get_logger().info(f'{start} at sample {self._run.newest}')
 
     def _refuse(self, message: str) -> None:
         """Fail; but while another reference may yet be discovered, it may be flying the platen."""

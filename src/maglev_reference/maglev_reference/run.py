@@ -94,12 +94,16 @@ class ReferenceRun:
         self.newest = sequence
         return True
 
-    def start(self, rest: FloatArray) -> None:
-        """Begin at the newest sample, the platen at rest at ``rest`` (5,) [m, rad].
+    def plan(self, rest: FloatArray) -> Timeline:
+        """What to :meth:`start`, the platen at rest at ``rest`` (5,) [m, rad].
 
-        Raises UnreachableError as :class:`Timeline`.
+        Takes its time, in which the stage goes on. Raises UnreachableError as :class:`Timeline`.
         """
-        self._timeline = Timeline(self._parameters, rest, self.autostart)
+        return Timeline(self._parameters, rest, self.autostart)
+
+    def start(self, timeline: Timeline) -> None:
+        """Begin at the newest sample."""
+        self._timeline = timeline
         self._origin = self.newest
 
     def observe_controller(self, mode: Mode, sequence: int) -> None:
