@@ -5,10 +5,14 @@ However it stands there, it flies bit for bit what it flies alone.
 
 from __future__ import annotations
 
+import os
+import random
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -35,20 +39,35 @@ def watching() -> Iterator[list[Observer]]:
         observer.close()
 
 
-def fly(
-    nodes: Nodes, watching: list[Observer], *remap: str, namespace: str = '', plant: str = ''
-) -> Observer:
-    """Start the loop with an observer, for which it waits."""
+def starts(nodes: Nodes, *rules: str, plant: str = '') -> list[Callable[[], object]]:
+    """What starts each node of the loop, which waits for an observer."""
+    watched = 'watchers:=[observer]'
+    arguments = [plant] if plant else []
+    return [
+        partial(nodes.start, 'plant', watched, *arguments, params=('benchmark.yaml',), remap=rules),
+        partial(nodes.start, 'controller', watched, remap=rules),
+        partial(
+            nodes.start, 'reference', watched, 'duration:=600.0', params=(SCENARIO,), remap=rules
+        ),
+    ]
+
+
+def observe(watching: list[Observer], namespace: str = '', remap: tuple[str, ...] = ()) -> None:
+    """Begin to observe all topics."""
     observer = Observer(namespace, remap)
     watching.append(observer)
     observer.watch(*SAMPLE_TOPICS)
+
+
+def fly(
+    nodes: Nodes, watching: list[Observer], *remap: str, namespace: str = '', plant: str = ''
+) -> Observer:
+    """Start the loop with an observer."""
+    observe(watching, namespace, remap)
     rules = (*remap, f'__ns:={namespace}') if namespace else remap
-    watched = 'watchers:=[observer]'
-    arguments = [plant] if plant else []
-    nodes.start('plant', watched, *arguments, params=('benchmark.yaml',), remap=rules)
-    nodes.start('controller', watched, remap=rules)
-    nodes.start('reference', watched, 'duration:=600.0', params=(SCENARIO,), remap=rules)
-    return observer
+    for start in starts(nodes, *rules, plant=plant):
+        start()
+    return watching[-1]
 
 
 def flown(observer: Observer) -> np.ndarray:
@@ -78,6 +97,20 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> np.ndarray:
         for process in nodes.started:
             process.kill()
         watching[0].close()
+
+
+@pytest.mark.parametrize('seed', range(int(os.environ.get('MAGLEV_START_ORDERS', '4'))))
+def test_any_order_of_start_with_up_to_five_strangers(
+    seed: int, alone: np.ndarray, nodes: Nodes, watching: list[Observer]
+) -> None:
+    draw = random.Random(seed)
+    stranger = partial(nodes.run, 'stranger', [sys.executable, str(STRANGER)])
+    orders = [*starts(nodes), partial(observe, watching), *[stranger] * draw.randint(0, 5)]
+    draw.shuffle(orders)
+    for start in orders:
+        start()
+        time.sleep(draw.choice((0.0, 0.1, 1.0)))
+    np.testing.assert_array_equal(flown(watching[0]), alone)
 
 
 def taken(subscription: PolledSubscription) -> list[int]:
