@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import gc
 from collections.abc import Callable
+from functools import partial
 from typing import TypeVar
 
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
@@ -24,6 +25,8 @@ class ManagedParameters(SourceParameters):
 
 
 P = TypeVar('P', bound=ManagedParameters)
+
+_ANSWER_TIME = 0.1  # in which whoever asked for the end gets the answer [s]
 
 _REFUSALS = (NodeError, StageError, ParameterError)
 
@@ -124,10 +127,11 @@ class ManagedNode(LifecycleNodeMixin, MaglevNode[P]):
         return self._transit('cleanup', 'unconfigured', self.cleanup)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """From any state to the end of the process."""
+        """From any state to the end of the process, once that is answered."""
         actions = {'active': (self.deactivate, self.cleanup), 'inactive': (self.cleanup,)}
         result = self._transit('shutdown', 'finalized', *actions.get(state.label, ()))
-        self.finish(0 if result == TransitionCallbackReturn.SUCCESS else 1)
+        end = partial(self.finish, 0 if result == TransitionCallbackReturn.SUCCESS else 1)
+        self.create_timer(_ANSWER_TIME, end, clock=self.steady_clock)
         return result
 
     def on_error(self, _state: LifecycleState) -> TransitionCallbackReturn:
