@@ -121,8 +121,8 @@ else
   flights=(test/scenario/test_scenarios.py test/graph) # the long ones first
   run_pytest -p xdist -n logical --maxprocesses 4 --dist loadfile test "${flights[@]/#/--ignore=}" ||
     code=$?
-  run_pytest -p xdist -n 2 --dist worksteal -m 'not realtime' "${flights[@]}" || code=$?
-  run_pytest -m realtime "${flights[@]}" || code=$?
+  run_pytest -p xdist -n 2 -m 'not alone' "${flights[@]}" || code=$?
+  run_pytest -m alone "${flights[@]}" || code=$?
 fi
 style=passed
 wait "$style_job" || style=failed

@@ -204,7 +204,7 @@ def test_a_dead_controller(nodes: Nodes, observer: Observer) -> None:
     assert graph['stage'].wait() == 0
 
 
-@pytest.mark.realtime
+@pytest.mark.alone
 def test_in_real_time_emulated_boards_bear_a_desktop(nodes: Nodes, observer: Observer) -> None:
     graph = fly(nodes, observer, 'realtime')
     before = observer.newest(MEASUREMENT).sequence

@@ -121,7 +121,7 @@ def test_emergency_stop_of_the_controller(nodes: Nodes, watching: Observer) -> N
     assert watching.call('/controller/enable', True).success
 
 
-@pytest.mark.realtime
+@pytest.mark.alone
 def test_real_time_also_when_a_process_was_stopped(nodes: Nodes, watching: Observer) -> None:
     graph = fly(nodes, LONG, mode='realtime')
     watching.wait(lambda: watching.newest(REFERENCE) is not None)
@@ -147,7 +147,7 @@ def test_real_time_also_when_a_process_was_stopped(nodes: Nodes, watching: Obser
         assert 'currents cut' not in graph['plant'].output
 
 
-@pytest.mark.parametrize('mode', ['lockstep', pytest.param('realtime', marks=pytest.mark.realtime)])
+@pytest.mark.parametrize('mode', ['lockstep', pytest.param('realtime', marks=pytest.mark.alone)])
 def test_retuning_in_flight_is_checked_and_bumpless(
     nodes: Nodes, watching: Observer, mode: str
 ) -> None:

@@ -153,7 +153,7 @@ def test_the_paper_on_its_own_model(tmp_path: Path) -> None:
     assert lifted['settling_time'] == pytest.approx(2.0, abs=0.1)
 
 
-@pytest.mark.realtime
+@pytest.mark.alone
 def test_real_time_with_everything_running(tmp_path: Path) -> None:
     options = ('--mode', 'realtime', '--duration', '3', '--params', soon(tmp_path))
     done = run('ellipse', tmp_path / 'run', *options)
