@@ -36,9 +36,8 @@ SHAPED = {
 
 def parameters(file: str, **overrides: object) -> ControllerParameters:
     """The parameters of ``params/laws``, and more."""
-    found = read_yaml(PARAMS / 'laws' / f'{file}.yaml', 'controller')
-    found.update({name.replace('__', '.'): value for name, value in overrides.items()})
-    return build(ControllerParameters, found)
+    found = from_yaml(ControllerParameters, 'controller', PARAMS / 'laws' / f'{file}.yaml')
+    return replace(found, {name.replace('__', '.'): value for name, value in overrides.items()})
 
 
 def design(file: str, axis: str, **overrides: object) -> AxisDesign:
