@@ -18,7 +18,7 @@ from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
 from maglev_model.axes import AXES
 from maglev_model.equilibrium import equilibrium_current, equilibrium_inverse, stiffness
-from maglev_model.inverse import CurrentLimits
+from maglev_model.inverse import Answer, CurrentLimits
 from maglev_model.machine import MachineParameters, machine_constants
 from maglev_model.parameters import ParameterError, build, from_yaml, read_yaml, replace
 from maglev_model.platen import accelerations
@@ -181,9 +181,8 @@ def test_linearisation_is_that_of_the_full_model(gap: float) -> None:
         wanted = np.zeros(5)
         wanted[axis] = 1e-4
         direct, quadrature, realised, excess = (np.zeros(n) for n in (4, 4, 5, 2))
-        saturated = equilibrium_inverse(
-            MACHINE, limits, np.ones(5), gap, wanted, direct, quadrature, realised, excess
-        )
+        answer = Answer(direct, quadrature, realised, excess)
+        saturated = equilibrium_inverse(MACHINE, limits, np.ones(5), gap, wanted, answer)
         assert not saturated
         np.testing.assert_allclose(realised, wanted, atol=1e-13)
         np.testing.assert_allclose(accelerate(state, direct, quadrature), wanted, atol=2e-8)
@@ -194,17 +193,9 @@ def test_linearisation_is_that_of_the_full_model(gap: float) -> None:
 def test_what_the_linear_inverse_says_it_realises(wanted: list[float]) -> None:
     """Within limits always, and with the currents it returns its own linear model agrees."""
     direct, quadrature, realised, excess = (np.zeros(n) for n in (4, 4, 5, 2))
-    saturated = equilibrium_inverse(
-        MACHINE,
-        CurrentLimits(7.0, 0.0, 0.0),
-        np.ones(5),
-        0.025,
-        np.array(wanted),
-        direct,
-        quadrature,
-        realised,
-        excess,
-    )
+    answer = Answer(direct, quadrature, realised, excess)
+    limits = CurrentLimits(7.0, 0.0, 0.0)
+    saturated = equilibrium_inverse(MACHINE, limits, np.ones(5), 0.025, np.array(wanted), answer)
     assert np.abs(direct).max() <= 7.0
     assert np.abs(quadrature).max() <= 7.0
     if saturated:
