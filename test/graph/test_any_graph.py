@@ -201,7 +201,8 @@ def test_help_that_nobody_reads_to_its_end(package: str, name: str) -> None:
         [executable(package, name), '--help'], stdout=writing, stderr=subprocess.PIPE, timeout=60
     )
     os.close(writing)
-    assert (done.returncode, done.stderr) == (128 + signal.SIGPIPE, b'')
+    assert done.stderr == b''
+    assert done.returncode in (0, 128 + signal.SIGPIPE)  # argparse itself is content
 
 
 def test_a_module_is_the_node_itself() -> None:
