@@ -21,7 +21,7 @@ from runner.options import (
     one_of,
     seconds,
 )
-from runner.overlays import PARAMS, check_overlay, overlay
+from runner.overlays import PARAMS, SECTIONS, check_overlay, overlay
 from runner.paper_tables import fly_all
 from runner.process import installed
 from runner.run import fly
@@ -37,6 +37,11 @@ MODE = Option(
     'as fast as it computes and repeatable, or 1 kHz by the clock\n(default lockstep)',
     'lockstep|realtime',
     one_of('lockstep', 'realtime'),
+)
+NAMESPACE = Option(
+    'where on the graph the nodes are: several runs, each in its own, fly at once',
+    'NS',
+    namespace,
 )
 PAPER = {
     'ellipse': "The paper's ellipse in y, x and z: lifts off, follows it for 60 s measured, lands.",
@@ -61,6 +66,7 @@ Some minutes in lockstep, a quarter of an hour in real time."""
 COMPARE = """\
 Flies all control laws over the same steps, ellipses, disturbances and mismatches on the benchmark
 plant, prints one table and draws their regions of operation. A few minutes on two cores."""
+HEARD_BY_COMPARE = ('controller', 'plant', '**')
 COMMISSION = """\
 Brings a machine up step by step at low current and says what is wired or set wrongly. Without an
 overlay it runs on the emulated boards."""
@@ -109,11 +115,7 @@ def _flight_command(name: str, description: str, call: str = '') -> Command:
             'OVERLAY.yaml',
             overlay,
         ),
-        '--namespace': Option(
-            'where on the graph the nodes are: several runs, each in its own, fly at once',
-            'NS',
-            namespace,
-        ),
+        '--namespace': NAMESPACE,
         '--out': _out_option('the run is', name),
     }
     return Command(call or f'{name}.sh', description, options)
@@ -181,18 +183,25 @@ def _paper_tables(options: Sequence[str]) -> Job:
     name = 'paper_tables'
     table = {
         '--mode': MODE,
+        '--namespace': NAMESPACE,
         '--out': _out_option('runs and page are', name),
         '--quick': Option('short windows: 6 s for each step, 4 s of each ellipse'),
     }
     given = Command(f'{name}.sh', PAPER_TABLES, table).parse(options)
-    mode = given.get('--mode', ['lockstep'])[-1]
-    return partial(fly_all, _out(name, given), mode, quick='--quick' in given)
+    mode, where = given.get('--mode', ['lockstep'])[-1], given.get('--namespace', [''])[-1]
+    return partial(fly_all, _out(name, given), mode, where, quick='--quick' in given)
 
 
 def _compare(options: Sequence[str]) -> Job:
     laws = 'only these: files of params/laws, paper, default'
     bandwidth = 'crossover of the laws with compensators, on all axes (default: as in their files)'
     table = {
+        '--params': Option(
+            "parameters of controller and plant on top of every law's own, from the current\n"
+            'folder or from params/; repeatable, the last one wins',
+            'OVERLAY.yaml',
+            overlay,
+        ),
         '--out': _out_option('the results are', 'compare'),
         '--quick': Option('coarse regions and short windows'),
         '--laws': Option(laws, 'NAME...', several=True),
@@ -201,7 +210,10 @@ def _compare(options: Sequence[str]) -> Job:
     given = Command('compare.sh', COMPARE, table).parse(options)
     arguments = ['--params', str(PARAMS), '--out', str(_out('compare', given))]
     arguments += _as_given(given, '--quick', '--laws', '--bandwidth')
-    return partial(_become, 'maglev_study', 'compare', arguments)
+    overlays = given.get('--params', [])
+    for file in overlays:
+        arguments += ['--overlay', file]
+    return partial(_become, 'maglev_study', 'compare', arguments, overlays, HEARD_BY_COMPARE)
 
 
 def _commission(options: Sequence[str]) -> Job:
@@ -227,11 +239,18 @@ def _as_given(given: Mapping[str, list[str]], *names: str) -> list[str]:
 
 
 def _become(
-    package: str, executable: str, arguments: Sequence[str], overlays: Sequence[str] = ()
+    package: str,
+    executable: str,
+    arguments: Sequence[str],
+    overlays: Sequence[str],
+    heard: Sequence[str] = SECTIONS,
 ) -> NoReturn:
-    """Go on as another program, which has the terminal and its signals to itself."""
+    """Go on as another program, which has the terminal and its signals to itself.
+
+    It hears those sections of the overlays.
+    """
     for path in overlays:
-        check_overlay(path)
+        check_overlay(path, sections=heard)
     path = installed(package, executable)
     os.execv(path, [path, *arguments])
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import site
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from runner.options import WrongUseError
@@ -26,10 +27,11 @@ def overlay(option: str, name: str) -> str:
     return str(path.resolve())
 
 
-def check_overlay(path: str, namespace: str = '') -> None:
+def check_overlay(path: str, namespace: str = '', sections: Sequence[str] = SECTIONS) -> None:
     """Refuse a file that no node would take, or that speaks to none. Needs the environment.
 
     :param namespace: that of the nodes, with which sections may name them too.
+    :param sections: those that are heard.
     """
     if sys.flags.no_site:
         site.main()
@@ -44,8 +46,8 @@ def check_overlay(path: str, namespace: str = '') -> None:
     loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
     content = yaml.compose(Path(path).read_text(encoding='utf-8'), Loader=loader)
     for key, _ in content.value if content else ():
-        if key.value.removeprefix(f'{namespace}/').lstrip('/') not in SECTIONS:
+        if key.value.removeprefix(f'{namespace}/').lstrip('/') not in sections:
             raise WrongUseError(
                 f"--params: '{path}' has parameters for '{key.value}',"
-                ' which is no node of a scenario'
+                f' which is no node here: {", ".join(sections)}'
             )

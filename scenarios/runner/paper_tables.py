@@ -19,17 +19,18 @@ QUICK = {'steps': '6.0', 'ellipse': '4.0', 'ellipse_4dof': '4.0'}
 """The scenarios, with short windows [s]."""
 
 
-def fly_all(out: Path, mode: str, *, quick: bool) -> int:
+def fly_all(out: Path, mode: str, namespace: str, *, quick: bool) -> int:
     """Fly six runs into a folder and write the page: 0 when all passed, 1 when not, 128 + signal.
 
     Raises WrongUseError before anything is started.
     """
     page = program('maglev_study', 'paper_tables')
     out = _make_folder(out)
-    say(f'paper_tables: {mode}, into {out}')
+    where = f' in {namespace}' if namespace else ''
+    say(f'paper_tables: {mode}{where}, into {out}')
     signals = Signals()
     failed = []
-    for flight in _flights(out, mode, quick):
+    for flight in _flights(out, mode, namespace, quick):
         name = str(flight.out.relative_to(out))
         say(f'paper_tables: {name}')
         if _attempt(flight, signals):
@@ -47,7 +48,7 @@ def fly_all(out: Path, mode: str, *, quick: bool) -> int:
     return 0
 
 
-def _flights(out: Path, mode: str, quick: bool) -> list[Flight]:
+def _flights(out: Path, mode: str, namespace: str, quick: bool) -> list[Flight]:
     return [
         Flight(
             Scenario(scenario, (f'scenario_{scenario}.yaml',)),
@@ -55,6 +56,7 @@ def _flights(out: Path, mode: str, quick: bool) -> list[Flight]:
             mode=mode,
             duration=duration if quick else '',
             overlays=tuple(str(PARAMS / name) for name in ('benchmark.yaml', *files)),
+            namespace=namespace,
         )
         for controller, files in LAWS.items()
         for scenario, duration in QUICK.items()

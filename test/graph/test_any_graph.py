@@ -191,6 +191,20 @@ def test_help(name: str) -> None:
         assert 'stage/true_state' in done.stdout
 
 
+@pytest.mark.parametrize(
+    ('package', 'name'), [('maglev_plant', 'plant'), ('maglev_monitor', 'compare_bags')]
+)
+def test_help_that_nobody_reads_to_its_end(package: str, name: str) -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = subprocess.run(
+        [executable(package, name), '--help'], stdout=writing, stderr=subprocess.PIPE, timeout=60
+    )
+    os.close(writing)
+    assert done.stderr == b''
+    assert done.returncode in (0, 128 + signal.SIGPIPE)  # argparse itself is content
+
+
 def test_a_module_is_the_node_itself() -> None:
     command = [sys.executable, '-m', 'maglev_plant.node', '-h']
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)

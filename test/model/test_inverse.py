@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from maglev_model.inverse import (
     CURRENT,
     LEVITATION,
+    Answer,
     CurrentLimits,
     exact_inverse,
     simplified_inverse,
@@ -41,7 +42,7 @@ gentle = st.tuples(
 rough = st.lists(st.floats(-2e3, 2e3), min_size=5, max_size=5).map(np.array)
 
 
-class Answer:
+class Answered:
     """What an inverse gives for one wanted acceleration."""
 
     def __init__(
@@ -54,17 +55,8 @@ class Answer:
     ) -> None:
         self.direct, self.quadrature = np.zeros(4), np.zeros(4)
         self.realised, self.excess = np.zeros(5), np.zeros(2)
-        self.limited_by = inverse(
-            MACHINE,
-            limits,
-            controlled,
-            output,
-            wanted,
-            self.direct,
-            self.quadrature,
-            self.realised,
-            self.excess,
-        )
+        answer = Answer(self.direct, self.quadrature, self.realised, self.excess)
+        self.limited_by = inverse(MACHINE, limits, controlled, output, wanted, answer)
         state = np.zeros(10)
         state[::2] = output
         self.plant = np.zeros(5)
@@ -76,7 +68,7 @@ class Answer:
 def test_exact_inverse_inverts_the_full_plant(output: np.ndarray, wanted: np.ndarray) -> None:
     """(6), (7) with the currents of the exact inverse give the wanted accelerations."""
     tilts = np.array([0.0, 0.0, 0.0, MACHINE.k_s_phi * output[3], MACHINE.k_s_theta * output[4]])
-    answer = Answer(exact_inverse, PRIORITY, output, wanted - tilts)
+    answer = Answered(exact_inverse, PRIORITY, output, wanted - tilts)
     np.testing.assert_allclose(answer.plant, wanted - tilts, rtol=1e-9, atol=1e-9)
     assert answer.limited_by == 0
     np.testing.assert_allclose(answer.quadrature[[0, 1]], answer.quadrature[[2, 3]])
@@ -86,7 +78,7 @@ def test_exact_inverse_inverts_the_full_plant(output: np.ndarray, wanted: np.nda
 @given(output=outputs, wanted=gentle)
 def test_simplified_inverse_solves_equation_11(output: np.ndarray, wanted: np.ndarray) -> None:
     """The paper's nominal model, from its a_i, b_j, c_k, gives the wanted accelerations."""
-    answer = Answer(simplified_inverse, WIDE, output, wanted)
+    answer = Answered(simplified_inverse, WIDE, output, wanted)
     a, b, c = np.zeros(9), np.zeros(6), np.zeros(6)
     u_x, u_z = answer.quadrature[1], answer.quadrature[0]
     affine_terms(MACHINE, output[0], output[3], output[4], u_x, u_z, a, b, c)
@@ -102,8 +94,8 @@ def test_simplified_inverse_solves_equation_11(output: np.ndarray, wanted: np.nd
 def test_the_paper_leaves_a_fifth_of_the_vertical_force_out_at_20_mm() -> None:
     """Off the balance the simplified inverse misses (6) by the quadratic terms of (9)."""
     output, wanted = np.array([0.020, 0.0, 0.0, 0.0, 0.0]), np.zeros(5)
-    simplified = Answer(simplified_inverse, WIDE, output, wanted)
-    exact = Answer(exact_inverse, WIDE, output, wanted)
+    simplified = Answered(simplified_inverse, WIDE, output, wanted)
+    exact = Answered(exact_inverse, WIDE, output, wanted)
     assert abs(exact.plant[0]) < 1e-12
     v_y = 2.0 * simplified.direct[0]
     a, b, c = np.zeros(9), np.zeros(6), np.zeros(6)
@@ -116,7 +108,7 @@ def test_the_paper_leaves_a_fifth_of_the_vertical_force_out_at_20_mm() -> None:
 @given(output=outputs, wanted=rough)
 def test_limits_hold_whatever_is_wanted(output: np.ndarray, wanted: np.ndarray) -> None:
     """Phase amplitude within 7 A, and what is said to be realised is what the plant then does."""
-    answer = Answer(exact_inverse, PRIORITY, output, wanted)
+    answer = Answered(exact_inverse, PRIORITY, output, wanted)
     amplitude = np.hypot(answer.direct, answer.quadrature)
     assert np.all(amplitude <= PRIORITY.current * (1.0 + 1e-9))
     np.testing.assert_allclose(answer.plant, answer.realised, rtol=1e-9, atol=1e-9)
@@ -132,7 +124,7 @@ def test_levitation_comes_first(output: np.ndarray, horizontal: tuple[float, flo
     """However much u_x and u_z are asked for, y and the tilts get what they want."""
     tilts = -np.array([MACHINE.k_s_phi * output[3], MACHINE.k_s_theta * output[4]])
     wanted = np.array([0.5, *horizontal, *tilts])
-    answer = Answer(exact_inverse, PRIORITY, output, wanted)
+    answer = Answered(exact_inverse, PRIORITY, output, wanted)
     np.testing.assert_allclose(answer.plant[[0, 3, 4]], wanted[[0, 3, 4]], rtol=1e-6, atol=1e-6)
     for axis in (1, 2):  # in the wanted direction, never more than wanted
         assert answer.plant[axis] * wanted[axis] >= 0.0
@@ -142,17 +134,17 @@ def test_levitation_comes_first(output: np.ndarray, horizontal: tuple[float, flo
 def test_without_priority_a_large_quadrature_current_costs_levitation() -> None:
     """Why there is one: i_q attracts, and at 7 A nothing is left to lower the attraction."""
     output, wanted = np.array([0.025, 0.0, 0.0, 0.0, 0.0]), np.array([0.0, 100.0, 0.0, 0.0, 0.0])
-    plain = Answer(exact_inverse, PRIORITY._replace(levitation_first=0.0), output, wanted)
+    plain = Answered(exact_inverse, PRIORITY._replace(levitation_first=0.0), output, wanted)
     assert abs(plain.quadrature[1]) == 7.0
     assert plain.plant[0] < -50.0
-    assert abs(Answer(exact_inverse, PRIORITY, output, wanted).plant[0]) < 1e-9
+    assert abs(Answered(exact_inverse, PRIORITY, output, wanted).plant[0]) < 1e-9
 
 
 def test_horizontal_acceleration_at_hover_is_enough_for_the_steps() -> None:
     """At least 6 m/s² anywhere in 20-30 mm; an even split of the attraction would give 5."""
     for gap in (0.020, 0.025, 0.030):
         output = np.array([gap, 0.0, 0.0, 0.0, 0.0])
-        answer = Answer(exact_inverse, PRIORITY, output, np.array([0.0, 100.0, 0.0, 0.0, 0.0]))
+        answer = Answered(exact_inverse, PRIORITY, output, np.array([0.0, 100.0, 0.0, 0.0, 0.0]))
         assert answer.plant[1] > 6.0
 
 
@@ -162,7 +154,7 @@ def test_tilts_without_control_get_equal_direct_currents(inverse: Callable[..., 
     controlled = np.array([1.0, 1.0, 1.0, 0.0, 0.0])
     output = np.array([0.024, 0.0, 0.0, 0.001, -0.002])
     wanted = np.array([1.0, 0.3, -0.2, 55.0, -70.0])
-    answer = Answer(inverse, WIDE, output, wanted, controlled)
+    answer = Answered(inverse, WIDE, output, wanted, controlled)
     assert answer.direct[0] == pytest.approx(answer.direct[2], abs=1e-12)
     assert answer.direct[1] == pytest.approx(answer.direct[3], abs=1e-12)
     if inverse is exact_inverse:
@@ -174,7 +166,7 @@ def test_horizontal_axes_without_control_get_no_current(inverse: Callable[..., i
     """And y without control gets no direct current."""
     controlled = np.array([0.0, 0.0, 0.0, 1.0, 1.0])
     output = np.array([0.025, 0.01, 0.0, 0.0, 0.0])
-    answer = Answer(inverse, WIDE, output, np.array([3.0, 2.0, 1.0, 0.0, 0.0]), controlled)
+    answer = Answered(inverse, WIDE, output, np.array([3.0, 2.0, 1.0, 0.0, 0.0]), controlled)
     assert not answer.quadrature.any()
     np.testing.assert_allclose(answer.direct, 0.0, atol=1e-12)
 
@@ -183,8 +175,8 @@ def test_simplified_saturation_is_sat_7() -> None:
     """u_x clipped at 7 A, the excess of (17) told, the other currents by themselves."""
     limits = CurrentLimits(current=7.0, levitation_first=0.0, least_attraction=0.0)
     output, wanted = np.array([0.025, 0.0, 0.0, 0.0, 0.0]), np.array([0.0, 90.0, 1.0, 0.0, 0.0])
-    answer = Answer(simplified_inverse, limits, output, wanted)
-    free = Answer(simplified_inverse, WIDE, output, wanted)
+    answer = Answered(simplified_inverse, limits, output, wanted)
+    free = Answered(simplified_inverse, WIDE, output, wanted)
     assert answer.quadrature[1] == -7.0
     assert answer.excess[0] == pytest.approx(-7.0 - free.quadrature[1])
     assert answer.excess[1] == 0.0
@@ -204,14 +196,14 @@ def test_simplified_saturation_is_sat_7() -> None:
 def test_what_limits_is_told(axis: int, wanted: float, limited_by: int) -> None:
     w = np.zeros(5)
     w[axis] = wanted
-    answer = Answer(exact_inverse, PRIORITY, np.array([0.025, 0.0, 0.0, 0.0, 0.0]), w)
+    answer = Answered(exact_inverse, PRIORITY, np.array([0.025, 0.0, 0.0, 0.0, 0.0]), w)
     assert answer.limited_by == limited_by
 
 
 def test_quadrature_current_yields_to_levitation_and_is_cut_by_the_current_without() -> None:
     output, wanted = np.array([0.025, 0.0, 0.0, 0.0, 0.0]), np.array([0.0, 100.0, 0.0, 0.0, 0.0])
-    assert Answer(exact_inverse, PRIORITY, output, wanted).limited_by & LEVITATION
-    plain = Answer(exact_inverse, PRIORITY._replace(levitation_first=0.0), output, wanted)
+    assert Answered(exact_inverse, PRIORITY, output, wanted).limited_by & LEVITATION
+    plain = Answered(exact_inverse, PRIORITY._replace(levitation_first=0.0), output, wanted)
     assert plain.limited_by & CURRENT
     wide = CurrentLimits(current=1000.0, levitation_first=1.0, least_attraction=0.1)
-    assert Answer(exact_inverse, wide, output, wanted).limited_by == LEVITATION
+    assert Answered(exact_inverse, wide, output, wanted).limited_by == LEVITATION

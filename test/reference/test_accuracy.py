@@ -101,7 +101,7 @@ def test_a_matching_internal_model_brings_it_to_the_figures_of_the_ellipse(name)
 
 @pytest.mark.parametrize('name', MATCHED)
 def test_the_matching_overlays_are_what_the_tool_gives(name, capsys):
-    assert match.main([str(PARAMS / f'scenario_{name}.yaml')]) == 0
+    assert match.run([str(PARAMS / f'scenario_{name}.yaml')]) == 0
     text = capsys.readouterr().out
     given = yaml.safe_load((PARAMS / f'matched_{name}.yaml').read_text(encoding='utf-8'))
     found = yaml.safe_load(text)
@@ -136,9 +136,9 @@ def test_what_is_matched_keeps_within_count_and_total():
 
 
 def test_what_does_not_repeat_cannot_be_matched(capsys, tmp_path):
-    assert match.main([str(PARAMS / 'scenario_chirp.yaml')]) == 2
+    assert match.run([str(PARAMS / 'scenario_chirp.yaml')]) == 2
     assert "trajectory 'chirp' does not repeat" in capsys.readouterr().err
-    assert match.main([str(tmp_path / 'none.yaml')]) == 2
+    assert match.run([str(tmp_path / 'none.yaml')]) == 2
     assert 'cannot read' in capsys.readouterr().err
     with pytest.raises(ParameterError, match="'steps' does not repeat"):
         match.matched(tables('scenario_steps')[0])

@@ -1,6 +1,7 @@
 """What cannot be followed is refused, with axis, value, bound and time."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -62,6 +63,42 @@ def test_each_motor_has_its_own_gap():
     with pytest.raises(UnreachableError, match='the gap at motor 2'):
         check_samples(samples, 0.0, PARAMETERS)
     assert utilisation(samples, PARAMETERS) > 1.0
+
+
+LOCKED = {  # by mode, as its stoppers lock the tilts
+    '3dof': [False, False, False, True, True],
+    '4dof': [False, False, False, True, False],
+}
+
+
+@pytest.mark.parametrize(('mode', 'axis'), [('3dof', 'phi'), ('3dof', 'theta'), ('4dof', 'phi')])
+@pytest.mark.parametrize('kind', ['trajectory', 'step', 'home'])
+def test_what_moves_a_locked_axis_is_refused_by_name(mode, axis, kind):
+    home = [0.025, 0.0, 0.0, 0.0, 0.0]
+    moved = {
+        'trajectory': {f'sinusoids.{axis}.amplitude': [1e-4]},
+        'step': {
+            'trajectory': 'steps',
+            'steps.axis': ['y', axis],
+            'steps.start': [0.025, 0.0],
+            'steps.target': [0.026, 1e-4],
+        },
+        'home': {'home': [*home[:3], *(0.0015 * (name == axis) for name in ('phi', 'theta'))]},
+    }[kind]
+    Timeline(build(ReferenceParameters, moved))
+    message = refused({'guide.locked': LOCKED[mode], **moved})
+    assert f"'guide.locked' locks {axis}" in message
+    if kind != 'home':
+        farthest = re.search(rf'{axis} is (\S+) rad at ', message)
+        assert abs(float(farthest[1])) == pytest.approx(1e-4, rel=1e-3)
+
+
+def test_what_leaves_the_locked_axes_alone_is_flown():
+    four = {'guide.locked': LOCKED['4dof'], 'sinusoids.theta.amplitude': [0.01]}
+    Timeline(build(ReferenceParameters, four))
+    three = {'guide.locked': LOCKED['3dof'], 'sinusoids.x.amplitude': [0.03]}
+    timeline = Timeline(build(ReferenceParameters, three), np.array([0.031, 0, 0, 4e-5, -4e-5]))
+    assert timeline.end is not None
 
 
 def test_a_jump_is_refused_unless_it_is_a_raw_step():

@@ -57,6 +57,12 @@ def test_all_runs_then_the_page(papers: Tree) -> None:
     assert (papers.out / 'ours' / 'ellipse_4dof' / 'report.html').exists()
 
 
+def test_all_runs_are_in_the_namespace(papers: Tree) -> None:
+    code, output = tables(papers, '--namespace', 'lab')
+    assert code == 0, output
+    assert [line.count('-r __ns:=/lab ') for line in papers.history('reference')] == [1] * 6
+
+
 def test_quick_runs_are_short(papers: Tree) -> None:
     assert tables(papers, '--quick')[0] == 0
     for run, line in zip(ALL_RUNS, papers.history('reference'), strict=True):
@@ -127,8 +133,8 @@ def test_a_folder_with_runs_is_refused(papers: Tree) -> None:
 @pytest.mark.parametrize(
     ('script', 'options'),
     [
-        ('paper_tables', ('--mode', '--out', '--quick')),
-        ('compare', ('--out', '--quick', '--laws', '--bandwidth')),
+        ('paper_tables', ('--mode', '--namespace', '--out', '--quick')),
+        ('compare', ('--params', '--out', '--quick', '--laws', '--bandwidth')),
         ('commission', ('--params', '--current', '--yes')),
         ('single_motor', ('--stage', '--mode', '--duration', '--params', '--namespace', '--out')),
     ],
@@ -159,19 +165,30 @@ def test_the_single_motor_flies_its_second_part_when_the_first_passed(
 
 
 def test_the_comparison_is_told_what_the_user_wants(tree: Tree) -> None:
+    tree.parameters('heavy.yaml', 'plant')
     options = ('--laws', 'paper', 'default', '--quick', '--bandwidth=300', '--out', 'here')
+    overlays = ('--params', 'soft', '--params', 'heavy.yaml')
     tree.behave('compare', '3')
-    assert tree.finish(*options, script='compare') == (3, '')
+    assert tree.finish(*options, *overlays, script='compare') == (3, '')
     params = tree.path / 'params'
     assert tree.history('compare') == [
         f'--params {params} --out here --quick --laws paper default --bandwidth 300'
+        f' --overlay {params}/soft.yaml --overlay {tree.path}/heavy.yaml'
     ]
 
 
-@pytest.mark.parametrize('option', ['--params', '--duration', '--law'])
+@pytest.mark.parametrize('option', ['--stage', '--duration', '--law'])
 def test_the_comparison_refuses_what_it_would_not_heed(tree: Tree, option: str) -> None:
     code, output = tree.finish(option, 'soft', script='compare')
     assert (code, output) == (2, f"compare: error: unknown option '{option}'; see --help\n")
+    assert not tree.history('compare')
+
+
+def test_the_comparison_refuses_parameters_of_nodes_that_it_has_not(tree: Tree) -> None:
+    tree.parameters('ours.yaml', 'reference')
+    code, output = tree.finish('--params', 'ours.yaml', script='compare')
+    assert code == 2
+    assert "parameters for 'reference', which is no node here: controller, plant, **" in output
     assert not tree.history('compare')
 
 

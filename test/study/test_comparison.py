@@ -15,7 +15,7 @@ from maglev_study.comparison import experiments, region
 from maglev_study.comparison.contestants import find_contestants
 from maglev_study.comparison.experiments import Row, StepExperiment
 from maglev_study.comparison.flight import Flight, judge
-from maglev_study.comparison.main import main
+from maglev_study.comparison.main import compare
 from maglev_study.comparison.region import LOST, NOT_SETTLED, Region
 from maglev_study.comparison.table import share, table, to_json
 from maglev_study.references import HOVER
@@ -42,6 +42,23 @@ def test_the_approaches_come_in_the_papers_order() -> None:
     assert by_name['paper'].stage().guide.locked == (False,) * 5
     with pytest.raises(ParameterError, match="no law 'ours', there are: jacobian_lead_lag"):
         find_contestants(PARAMS, ['ours'])
+
+
+def test_an_overlay_lies_over_every_law(tmp_path: Path) -> None:
+    """Its machine is the law's and the stage's; the last one wins; others' sections are theirs."""
+    over, last = tmp_path / 'over.yaml', tmp_path / 'last.yaml'
+    over.write_text(
+        '/**: {ros__parameters: {machine: {mass_y: 7.5}, guide: {viscous: [1.0, 1.0,'
+        ' 1.0, 1.0, 1.0]}}}\nreference: {ros__parameters: {duration: 3.0}}\n'
+    )
+    last.write_text(
+        'controller: {ros__parameters: {y: {controlled: true}}}\n'
+        'plant: {ros__parameters: {machine: {mass_y: 7.6}}}\n'
+    )
+    for one in find_contestants(PARAMS, overlays=[over, last]):
+        assert one.controller.machine.mass_y == 7.5
+        assert one.stage().machine.mass_y == 7.6
+        assert one.stage().guide.viscous == (1.0,) * 5
 
 
 def test_judgement() -> None:
@@ -145,7 +162,7 @@ def test_the_whole_command(
     monkeypatch.setattr(experiments, 'SHAPED_STEPS', ())
     out = tmp_path / 'a' / 'b'
     options = ['--params', str(PARAMS), '--out', str(out), '--quick', '--laws']
-    assert main([*options, 'default', 'regulator_3dof']) == 0
+    assert compare([*options, 'default', 'regulator_3dof']) == 0
     printed = capsys.readouterr().out
     assert 'without ROS' in printed
     text = (out / 'comparison.txt').read_text()
@@ -166,13 +183,14 @@ def test_the_whole_command(
         (['--laws', 'nobody'], "there is no law 'nobody'"),
         (['--laws', 'feedback_soi', '--bandwidth', '900'], 'y: a crossover of 900 rad/s'),
         (['--laws', 'default', '--out', '/proc/none/x'], "cannot write to '/proc/none/x'"),
+        (['--overlay', 'none.yaml'], "cannot read parameter file 'none.yaml'"),
     ],
 )
 def test_bad_options(
     options: list[str], reason: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """One line, exit code 2, nothing flown."""
-    assert main(['--params', str(PARAMS), '--out', str(tmp_path), *options]) == 2
+    assert compare(['--params', str(PARAMS), '--out', str(tmp_path), *options]) == 2
     captured = capsys.readouterr()
     assert reason in captured.err
     assert captured.err.count('\n') == 1

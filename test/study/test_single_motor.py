@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
-from maglev_model.inverse import CurrentLimits, exact_inverse
+from maglev_model.inverse import Answer, CurrentLimits, exact_inverse
 from maglev_model.machine import MachineParameters, machine_constants
 from maglev_model.motor import horizontal_force, vertical_force
 from maglev_model.parameters import ParameterError, build, from_yaml, replace
@@ -40,9 +40,8 @@ def inverse(
     output, wanted = np.zeros(5), np.zeros(5)
     output[0], wanted[0], wanted[1] = gap, w_y, w_x
     direct, quadrature, realised, excess = (np.full(n, 9.0) for n in (4, 4, 5, 2))
-    limited = exact_inverse(
-        MACHINE, limits, BOTH, output, wanted, direct, quadrature, realised, excess
-    )
+    answer = Answer(direct, quadrature, realised, excess)
+    limited = exact_inverse(MACHINE, limits, BOTH, output, wanted, answer)
     return direct, quadrature, realised, limited
 
 

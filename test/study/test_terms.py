@@ -147,7 +147,7 @@ def few_tilts(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize('kind', ['png', 'svg'])
 def test_the_command_draws_and_prints(kind: str, tmp_path: Path, capsys: object) -> None:
     out = tmp_path / 'new'
-    assert terms_cli.main(['--out', str(out), '--format', kind]) == 0
+    assert terms_cli.run(['--out', str(out), '--format', kind]) == 0
     data = (out / f'terms.{kind}').read_bytes()
     assert data.startswith(b'\x89PNG') if kind == 'png' else b'</svg>' in data
     assert [path.name for path in out.iterdir()] == [f'terms.{kind}']
@@ -164,7 +164,7 @@ def test_the_command_draws_and_prints(kind: str, tmp_path: Path, capsys: object)
 def test_a_wrong_range_of_gaps_is_one_line(
     gaps: tuple[str, str], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert terms_cli.main(['--gap', *gaps]) == 2
+    assert terms_cli.run(['--gap', *gaps]) == 2
     captured = capsys.readouterr()
     assert captured.out == ''
     assert captured.err.startswith('terms: error: --gap is')
@@ -176,7 +176,7 @@ def test_an_output_that_cannot_be_written_is_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / 'file').write_text('')
-    assert terms_cli.main(['--out', str(tmp_path / 'file')]) == 2
+    assert terms_cli.run(['--out', str(tmp_path / 'file')]) == 2
     assert 'cannot write to' in capsys.readouterr().err
 
 

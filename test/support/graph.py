@@ -7,7 +7,7 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -91,10 +91,14 @@ class Nodes:
         *arguments: str,
         params: tuple[str | Path, ...] = (),
         remap: tuple[str, ...] = (),
+        on: Sequence[str] = (),
     ) -> Process:
-        """Start ``plant``, ``controller``, … with parameters ``name:=value``, files, remappings."""
+        """Start ``plant``, ``controller``, … with parameters ``name:=value``, files, remappings.
+
+        ``on`` is what the command begins with that starts it on another host.
+        """
         package = {'recorder': 'maglev_monitor'}.get(name, f'maglev_{name}')
-        command = [executable(package, name), '--ros-args']
+        command = [*on, executable(package, name), '--ros-args']
         for file in params:
             path = PARAMS / file if (PARAMS / file).exists() else Path(file)
             command += ['--params-file', str(path)]

@@ -23,7 +23,7 @@ from maglev_controller.control_arrays import (
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
 from maglev_model.equilibrium import equilibrium_inverse
-from maglev_model.inverse import CurrentLimits, exact_inverse, simplified_inverse
+from maglev_model.inverse import Answer, CurrentLimits, clip, exact_inverse, simplified_inverse
 from maglev_model.machine import Machine
 from maglev_model.machine_array import machine_from_array
 from maglev_model.platen import outputs_from_gaps
@@ -162,7 +162,7 @@ def _virtual_input(
     axis.reference_acceleration = acceleration
     axis.smooth_velocity = smooth_velocity
     error = measured - position - to_position
-    sample.learned_error[index] = _limited(error, settings.learned_error[index])
+    sample.learned_error[index] = clip(error, settings.learned_error[index])
     if settings.observed[index]:
         seen, seen_velocity = _observe(settings, axis, index, measured)
         error, error_rate = seen - position - to_position, seen_velocity - smooth_velocity
@@ -170,7 +170,7 @@ def _virtual_input(
         change = measured - axis.filtered_position
         axis.filtered_position += forget * change
         error_rate = settings.filter_gain[index] * change - axis.filtered_velocity
-    error = _limited(error, settings.error_limit[index])
+    error = clip(error, settings.error_limit[index])
     axis.error = error
     axis.bump *= settings.fade
     feedback = settings.error_gain[index] * error + settings.rate_gain[index] * error_rate
@@ -181,46 +181,18 @@ def _virtual_input(
 
 
 @compiled
-def _limited(value: float, limit: float) -> float:
-    return min(max(value, -limit), limit)
-
-
-@compiled
 def _currents(
     settings: Record, machine: Machine, sample: Record, direct: FloatArray, quadrature: FloatArray
 ) -> int:
     """The inverse of the settings, from w; what limited the currents."""
     limits = CurrentLimits(settings.current, settings.levitation_first, settings.least_attraction)
     controlled, wanted = settings.controlled, sample.virtual_input
-    realised, excess = sample.realised, sample.excess
+    answer = Answer(direct, quadrature, sample.realised, sample.excess)
     if settings.inverse == EXACT:
-        return exact_inverse(
-            machine,
-            limits,
-            controlled,
-            sample.position,
-            wanted,
-            direct,
-            quadrature,
-            realised,
-            excess,
-        )
+        return exact_inverse(machine, limits, controlled, sample.position, wanted, answer)
     if settings.inverse == SIMPLIFIED:
-        return simplified_inverse(
-            machine,
-            limits,
-            controlled,
-            sample.position,
-            wanted,
-            direct,
-            quadrature,
-            realised,
-            excess,
-        )
-    gap = settings.equilibrium
-    return equilibrium_inverse(
-        machine, limits, controlled, gap, wanted, direct, quadrature, realised, excess
-    )
+        return simplified_inverse(machine, limits, controlled, sample.position, wanted, answer)
+    return equilibrium_inverse(machine, limits, controlled, settings.equilibrium, wanted, answer)
 
 
 @compiled

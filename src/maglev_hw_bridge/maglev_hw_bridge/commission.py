@@ -10,6 +10,7 @@ import argparse
 import sys
 import time
 from collections.abc import Callable, Sequence
+from typing import NoReturn
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from maglev_hw_bridge.response import Pulses, Twins
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES, PHASE_NAMES, PHASES
 from maglev_hw_bridge.stage import BridgeStage, Mode
 from maglev_model.axes import FloatArray
+from maglev_model.command import leave_with
 from maglev_model.inverse import CurrentLimits, exact_currents
 from maglev_model.machine import machine_constants
 from maglev_model.parameters import ParameterError, from_yaml
@@ -250,6 +252,6 @@ def run(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def main() -> None:
+def main() -> NoReturn:
     """Entry point of the executable ``commission``."""
-    sys.exit(run())
+    leave_with(run)

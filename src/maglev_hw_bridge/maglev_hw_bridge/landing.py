@@ -14,7 +14,7 @@ import numpy as np
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
-from maglev_model.inverse import CurrentLimits, exact_inverse
+from maglev_model.inverse import Answer, CurrentLimits, exact_inverse
 from maglev_model.machine import Machine, machine_constants
 from maglev_model.machine_array import MachineArray, machine_from_array
 from maglev_model.platen import output_accelerations
@@ -86,10 +86,7 @@ def land(block: Block, position: FloatArray, rate: FloatArray) -> bool:
         np.ones(5),
         position,
         wanted,
-        landing.direct[:],
-        landing.quadrature[:],
-        np.empty(5),
-        np.empty(2),
+        Answer(landing.direct[:], landing.quadrature[:], np.empty(5), np.empty(2)),
     )
     return time > landing.descent_start + landing.descent_time + landing.settle_time
 

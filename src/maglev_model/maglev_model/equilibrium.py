@@ -12,7 +12,7 @@ import math
 
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
-from maglev_model.inverse import CURRENT, CurrentLimits
+from maglev_model.inverse import CURRENT, Answer, CurrentLimits, clip
 from maglev_model.machine import Machine
 from maglev_model.motor import attraction_coefficients
 
@@ -42,33 +42,26 @@ def stiffness(machine: Machine, gap: float) -> tuple[float, float, float, float,
 
 
 @compiled
-def _clip(value: float, limit: float) -> float:
-    return min(max(value, -limit), limit)
-
-
-@compiled
 def equilibrium_inverse(
     machine: Machine,
     limits: CurrentLimits,
     controlled: FloatArray,
     gap: float,
     wanted: FloatArray,
-    direct: FloatArray,
-    quadrature: FloatArray,
-    realised: FloatArray,
-    excess: FloatArray,
+    answer: Answer,
 ) -> int:
     """Currents for w by the gains at the equilibrium ``gap`` [m], each limited by itself.
 
     The other arguments are those of the module ``inverse``.
     """
+    direct, quadrature, realised, excess = answer
     _, b, h = attraction_coefficients(machine, gap)
     slope = b * math.sqrt(machine.M_y * machine.G)  # of a motor's pull over i_d, -∂P/∂i_d [N/A]
     bias = equilibrium_current(machine, gap)
     gain_y, gain_tilt = 2.0 * slope / machine.M_y, -slope * machine.r / machine.I_x
     h_x, h_z = -2.0 * h / machine.M_x, -2.0 * h / machine.M_z
     u_x, u_z = controlled[1] * wanted[1] / h_x, controlled[2] * wanted[2] / h_z
-    sat_x, sat_z = _clip(u_x, limits.current), _clip(u_z, limits.current)
+    sat_x, sat_z = clip(u_x, limits.current), clip(u_z, limits.current)
     v_y = controlled[0] * wanted[0] / gain_y
     v_phi = controlled[3] * wanted[3] / gain_tilt
     v_theta = controlled[4] * wanted[4] / gain_tilt
@@ -76,7 +69,7 @@ def equilibrium_inverse(
     saturated = sat_x != u_x or sat_z != u_z
     for motor in range(4):
         unlimited = bias + 0.5 * (v_y + parts[motor])
-        direct[motor] = _clip(unlimited, limits.current)
+        direct[motor] = clip(unlimited, limits.current)
         quadrature[motor] = sat_z if motor % 2 == 0 else sat_x
         saturated = saturated or direct[motor] != unlimited
     v_y = 0.5 * (direct[0] + direct[1] + direct[2] + direct[3]) - 2.0 * bias

@@ -6,9 +6,8 @@ given. Both keep the currents within their limits and report what accelerations 
 
 Arguments of both, all arrays float64: ``output`` y, x, z, phi, theta (5,) [m, rad]; ``wanted`` w
 (5,) [m/s², rad/s²]; ``controlled`` (5,), an axis whose value is 0 gets no control, as the paper's
-v_φ = v_θ = 0. Written: ``direct`` i_d and ``quadrature`` i_q (4,) [A], ``realised`` (5,), the
-accelerations the limited currents give by the inverse's own model, and ``excess`` (2,), sat(u) − u
-of u_x, u_z [A]. Both return what limited the currents, as bits, 0 for nothing:
+v_φ = v_θ = 0. Written is the :class:`Answer`. Both return what limited the currents, as bits, 0 for
+nothing:
 
 - :data:`CURRENT`: a current or a motor's amplitude is at its limit.
 - :data:`LEVITATION` (of the exact inverse): the attraction wanted, of all motors or of a pair, is
@@ -48,12 +47,22 @@ class CurrentLimits(NamedTuple):
     least_attraction: float  # share of the weight always carried, so that the tilts keep authority
 
 
+class Answer(NamedTuple):
+    """What an inverse writes: arrays of float64."""
+
+    direct: FloatArray  # i_d (4,) [A]
+    quadrature: FloatArray  # i_q (4,) [A]
+    realised: FloatArray  # (5,), what the limited currents give by the inverse's own model
+    excess: FloatArray  # (2,), sat(u) − u of u_x, u_z [A]
+
+
 NO_LIMITS = CurrentLimits(math.inf, 1.0, 0.0)
 """Any current: only what no current at all can give is out of reach."""
 
 
 @compiled
-def _clip(value: float, limit: float) -> float:
+def clip(value: float, limit: float) -> float:
+    """A value within ``limit`` of 0."""
     return min(max(value, -limit), limit)
 
 
@@ -64,19 +73,17 @@ def simplified_inverse(
     controlled: FloatArray,
     output: FloatArray,
     wanted: FloatArray,
-    direct: FloatArray,
-    quadrature: FloatArray,
-    realised: FloatArray,
-    excess: FloatArray,
+    answer: Answer,
 ) -> int:
     """The paper's (12) and (8), each current limited by itself; arguments: see the module."""
+    direct, quadrature, realised, excess = answer
     gap = np.empty(4)
     gaps_from_outputs(machine, output, gap)
     a, b, c = np.empty(9), np.empty(6), np.empty(6)
     h_x, h_z = _horizontal_gains(machine, gap)
     u_x = controlled[1] * wanted[1] / h_x
     u_z = controlled[2] * wanted[2] / h_z
-    sat_x, sat_z = _clip(u_x, limits.current), _clip(u_z, limits.current)
+    sat_x, sat_z = clip(u_x, limits.current), clip(u_z, limits.current)
     affine_terms(machine, output[0], output[3], output[4], sat_x, sat_z, a, b, c)
     v_y, v_phi, v_theta = _solve_simplified(a, b, c, wanted, controlled)
     unlimited = (
@@ -87,7 +94,7 @@ def simplified_inverse(
     )
     saturated = sat_x != u_x or sat_z != u_z
     for motor in range(4):
-        direct[motor] = _clip(unlimited[motor], limits.current)
+        direct[motor] = clip(unlimited[motor], limits.current)
         quadrature[motor] = sat_z if motor % 2 == 0 else sat_x
         saturated = saturated or direct[motor] != unlimited[motor]
     v_y = 0.5 * (direct[0] + direct[1] + direct[2] + direct[3])
@@ -129,10 +136,7 @@ def _single_motor_inverse(
     controlled: FloatArray,
     output: FloatArray,
     wanted: FloatArray,
-    direct: FloatArray,
-    quadrature: FloatArray,
-    realised: FloatArray,
-    excess: FloatArray,
+    answer: Answer,
 ) -> int:
     """Motor 2 through the quadratic (2). See the module for the arguments.
 
@@ -140,6 +144,7 @@ def _single_motor_inverse(
     When levitation comes first, i_q gets what the attraction leaves: ``b² i_q² ≤ P`` and i_d within
     the amplitude. The other motors get no current.
     """
+    direct, quadrature, realised, excess = answer
     a, b, h = attraction_coefficients(machine, output[0])
     gain = -h / machine.M_x
     u_x = controlled[1] * wanted[1] / gain
@@ -195,10 +200,7 @@ def exact_inverse(
     controlled: FloatArray,
     output: FloatArray,
     wanted: FloatArray,
-    direct: FloatArray,
-    quadrature: FloatArray,
-    realised: FloatArray,
-    excess: FloatArray,
+    answer: Answer,
 ) -> int:
     """Per motor through the quadratic (2). See the module for the arguments.
 
@@ -210,9 +212,8 @@ def exact_inverse(
     u_x and u_z. Of a machine with a single motor it is that motor that (2) is solved for.
     """
     if machine.motors == 1.0:
-        return _single_motor_inverse(
-            machine, limits, controlled, output, wanted, direct, quadrature, realised, excess
-        )
+        return _single_motor_inverse(machine, limits, controlled, output, wanted, answer)
+    direct, quadrature, realised, excess = answer
     gap, a, b, h = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
     gaps_from_outputs(machine, output, gap)
     for motor in range(4):
@@ -224,7 +225,7 @@ def exact_inverse(
     limited_by = _allocate(machine, limits, controlled, output, wanted, a, b, u_x, u_z, attraction)
     limit_x = _quadrature_limit(limits, a, b, attraction, 1)
     limit_z = _quadrature_limit(limits, a, b, attraction, 0)
-    sat_x, sat_z = _clip(u_x, limit_x), _clip(u_z, limit_z)
+    sat_x, sat_z = clip(u_x, limit_x), clip(u_z, limit_z)
     limited_by |= _cut_by(limits, u_x, sat_x, limit_x) | _cut_by(limits, u_z, sat_z, limit_z)
     for motor in range(4):
         quadrature[motor] = sat_z if motor % 2 == 0 else sat_x
@@ -272,18 +273,18 @@ def _allocate(
     phi = controlled[3] * inertia * (wanted[3] + machine.k_s_phi * output[3])
     theta = controlled[4] * inertia * (wanted[4] + machine.k_s_theta * output[4])
     saturated = saturated or abs(phi) > 0.5 * total or abs(theta) > 0.5 * total
-    phi, theta = _clip(phi, 0.5 * total), _clip(theta, 0.5 * total)
+    phi, theta = clip(phi, 0.5 * total), clip(theta, 0.5 * total)
     along_z = 0.5 * total
     if limits.levitation_first != 0.0:
         bound = limits.current
-        need_z = _pair_need(_clip(u_z, bound), b[0], b[2], phi, 0.25 * least)
-        need_x = _pair_need(_clip(u_x, bound), b[1], b[3], -theta, 0.25 * least)
+        need_z = _pair_need(clip(u_z, bound), b[0], b[2], phi, 0.25 * least)
+        need_x = _pair_need(clip(u_x, bound), b[1], b[3], -theta, 0.25 * least)
         if need_x + need_z > total:
             along_z = total * need_z / (need_x + need_z)
         else:
             along_z = min(max(along_z, need_z), total - need_x)
     along_x = total - along_z
-    phi, theta = _clip(phi, along_z), _clip(theta, along_x)
+    phi, theta = clip(phi, along_z), clip(theta, along_x)
     attraction[0], attraction[2] = 0.5 * (along_z + phi), 0.5 * (along_z - phi)
     attraction[1], attraction[3] = 0.5 * (along_x - theta), 0.5 * (along_x + theta)
     return LEVITATION if saturated else 0
@@ -356,7 +357,7 @@ def _direct_currents(
         limit = limits.current
         if limits.levitation_first != 0.0:
             limit = math.sqrt(max(limit * limit - quadrature[motor] ** 2, 0.0))
-        limited = _clip(direct[motor], limit * (1.0 + 1e-12))
+        limited = clip(direct[motor], limit * (1.0 + 1e-12))
         if abs(limited - direct[motor]) > 1e-9:
             limited_by |= CURRENT
         direct[motor] = limited
@@ -375,8 +376,8 @@ def _all_currents(
 ) -> None:
     controlled, realised, excess = np.ones(5), np.empty(5), np.empty(2)
     for k in range(outputs.shape[0]):
-        answer = direct[k], quadrature[k], realised, excess
-        limited_by = exact_inverse(machine, limits, controlled, outputs[k], wanted[k], *answer)
+        answer = Answer(direct[k], quadrature[k], realised, excess)
+        limited_by = exact_inverse(machine, limits, controlled, outputs[k], wanted[k], answer)
         possible[k] = limited_by == 0
 
 

@@ -15,6 +15,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
+from maglev_model.command import leave_with
 from maglev_model.parameters import ParameterError
 from maglev_node.dds import prepare_middleware
 from maglev_node.node import MaglevNode, NodeError
@@ -68,8 +69,7 @@ def main(node: type[MaglevNode[Any]], name: str, *, background: bool = False) ->
     Leaves without the interpreter's own teardown, which may block in the middleware.
     """
     if {'-h', '--help'} & set(sys.argv[1:]):
-        print(usage(node, name))
-        return
+        leave_with(lambda: _help(node, name))
     if background:
         os.nice(_BACKGROUND_NICENESS)
     try:
@@ -80,6 +80,11 @@ def main(node: type[MaglevNode[Any]], name: str, *, background: bool = False) ->
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(code)
+
+
+def _help(node: type[MaglevNode[Any]], name: str) -> int:
+    print(usage(node, name))
+    return 0
 
 
 def _is_user_error(error: Exception) -> bool:

@@ -14,6 +14,7 @@ from maglev_reference.motion import Kinematics
 from maglev_reference.parameters import ReferenceParameters
 
 _SLACK = 1e-6  # of a range, for rounding
+_STILL = 1e-9  # [m, rad]: as good as no move
 _MOTORS = tuple(f'the gap at motor {motor}' for motor in range(1, 5))
 
 
@@ -48,6 +49,29 @@ def check_samples(
     low, high = limits.motor_gap
     _within(gaps, np.full(4, low), np.full(4, high), time, _MOTORS, ('m',) * 4)
     _check_slew(samples.position, time, parameters, jumps)
+
+
+def check_locked(
+    position: FloatArray,
+    measured: npt.NDArray[np.bool_],
+    first_time: float,
+    parameters: ReferenceParameters,
+) -> None:
+    """Refuse consecutive positions (n, 5), the first at ``first_time`` [s], that stoppers prevent.
+
+    What is measured, where ``measured`` (n,), leaves an axis of ``guide.locked`` at home. Raises
+    :class:`UnreachableError`.
+    """
+    away = np.abs(position - np.array(parameters.home)) * parameters.guide.locked
+    away[~measured] = 0.0
+    row, column = np.unravel_index(np.argmax(away), away.shape)
+    if not away[row, column] > _STILL:
+        return
+    raise UnreachableError(
+        f'unreachable reference: {AXES[column]} is {position[row, column]:.6g} {UNITS[column]} at '
+        f"{first_time + row * parameters.sample_time:.3f} s, but parameter 'guide.locked' locks "
+        f'{AXES[column]}: it must stay at home, at {parameters.home[column]:g} {UNITS[column]}'
+    )
 
 
 def utilisation(samples: Kinematics, parameters: ReferenceParameters) -> float:
@@ -86,6 +110,13 @@ def check_rest(position: FloatArray, parameters: ReferenceParameters) -> None:
             f'lift-off refused: the platen is at a gap of {1e3 * position[Y]:.3f} mm, not on its '
             f'lower stop at {1e3 * gap:.3f} mm; lower it by hand or correct lift_off.rest_gap'
         )
+    for axis, locked in enumerate(parameters.guide.locked):
+        if locked and abs(position[axis] - parameters.home[axis]) > tolerance:
+            raise UnreachableError(
+                f"lift-off refused: parameter 'guide.locked' locks {AXES[axis]} at "
+                f'{position[axis]:.6g} {UNITS[axis]}, but home is at {parameters.home[axis]:g} '
+                f'{UNITS[axis]}'
+            )
     samples = Kinematics(position[None, :], np.zeros((1, 5)), np.zeros((1, 5)))
     check_samples(samples, 0.0, parameters)
 

@@ -14,11 +14,12 @@ import argparse
 import math
 import sys
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
 from maglev_model.axes import AXES
+from maglev_model.command import leave_with
 from maglev_model.parameters import ParameterError, from_yaml
 from maglev_reference.accuracy import compliance, disturbance_lines
 from maglev_reference.parameters import ReferenceParameters
@@ -72,8 +73,13 @@ def overlay(fundamental: float, multiples: dict[str, list[float]]) -> str:
     return '\n'.join(text) + '\n'
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point of the executable ``match``: 0, or 2 with a line saying what is wrong."""
+def main() -> NoReturn:
+    """Entry point of the executable ``match``."""
+    leave_with(run)
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Run the command: 0, or 2 with a line saying what is wrong."""
     parser = argparse.ArgumentParser(
         prog='match', description='Internal models for a repeated trajectory, as an overlay.'
     )
@@ -101,4 +107,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    main()

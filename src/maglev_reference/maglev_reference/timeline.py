@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from maglev_model.axes import FloatArray, Y
 from maglev_model.phases import Phase
-from maglev_reference.check import UnreachableError, check_rest, check_samples
+from maglev_reference.check import UnreachableError, check_locked, check_rest, check_samples
 from maglev_reference.currents import check_currents
 from maglev_reference.motion import Kinematics, State, state_at
 from maglev_reference.parameters import ReferenceParameters
@@ -24,6 +24,7 @@ from maglev_reference.segments import Planner, Segment
 
 _CHUNK = 256  # samples evaluated together, so that a value does not depend on who asks for how many
 _CHECKED_TOGETHER = 65536
+_MEASURED = (Phase.TRACK, Phase.STEP)
 
 
 class Block(NamedTuple):
@@ -248,15 +249,13 @@ class Timeline:
     def _check(self) -> None:
         """What is measured first, so that it and not the way to it is found at fault."""
         end = self._segments[-1].first
-        measured = (Phase.TRACK, Phase.STEP)
-        for segment in sorted(self._segments, key=lambda segment: segment.phase not in measured):
+        for segment in sorted(self._segments, key=lambda segment: segment.phase not in _MEASURED):
             self._check_range(max(segment.first - 1, 0), min(segment.last, end) + 1)
 
     def _check_way_up(self, first: int) -> None:
         """From sample ``first`` to what is measured; that has been checked, and what follows."""
-        measured = (Phase.TRACK, Phase.STEP)
         stop = next(
-            each.first for each in self._segments if each.first > first and each.phase in measured
+            each.first for each in self._segments if each.first > first and each.phase in _MEASURED
         )
         self._check_range(first, stop)
 
@@ -268,5 +267,7 @@ class Timeline:
             block = self._evaluate(start, count)
             samples = Kinematics(block.position, block.velocity, block.acceleration)
             jumps = np.isin(np.arange(start, start + count), jumps_at)
+            measured = np.isin(block.phase, _MEASURED)
+            check_locked(block.position, measured, start * sample_time, self._parameters)
             check_samples(samples, start * sample_time, self._parameters, jumps)
             check_currents(samples, start * sample_time, self._parameters)

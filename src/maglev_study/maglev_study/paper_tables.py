@@ -12,9 +12,10 @@ import json
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 from maglev_model.axes import AXES
+from maglev_model.command import leave_with
 from maglev_monitor.bag.analysis import Analysis, analyse
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.metrics.readable import angle_or_length, micro, seconds
@@ -158,9 +159,9 @@ def paper_tables(arguments: Sequence[str] | None = None) -> int:
     return NOT_PASSED if any(run.problem for run in runs) else PASS
 
 
-def main() -> None:
+def main() -> NoReturn:
     """Entry point of the executable."""
-    sys.exit(paper_tables())
+    leave_with(paper_tables)
 
 
 def _parser() -> argparse.ArgumentParser:

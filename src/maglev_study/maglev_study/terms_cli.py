@@ -6,9 +6,11 @@ import argparse
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 
+from maglev_model.command import leave_with
 from maglev_model.machine import Machine, MachineParameters, machine_constants
 from maglev_study.terms import (
     POWERS,
@@ -30,8 +32,13 @@ _LEAST_GAP = 0.012  # so that no motor's gap closes at the largest tilts [m]
 _ROWS, _POINTS = 5, 41
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point of the executable; its exit code is 0, or 2 with one line of error."""
+def main() -> NoReturn:
+    """Entry point of the executable."""
+    leave_with(run)
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Run the command and return its exit code: 0, or 2 with one line of error."""
     options = _parser().parse_args(arguments)
     parameters = MachineParameters()
     machine = machine_constants(parameters)
@@ -163,4 +170,4 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    main()

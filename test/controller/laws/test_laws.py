@@ -18,7 +18,7 @@ from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
 from maglev_model.axes import AXES
 from maglev_model.equilibrium import equilibrium_current, equilibrium_inverse, stiffness
-from maglev_model.inverse import CurrentLimits
+from maglev_model.inverse import Answer, CurrentLimits
 from maglev_model.machine import MachineParameters, machine_constants
 from maglev_model.parameters import ParameterError, build, from_yaml, read_yaml, replace
 from maglev_model.platen import accelerations
@@ -36,9 +36,8 @@ SHAPED = {
 
 def parameters(file: str, **overrides: object) -> ControllerParameters:
     """The parameters of ``params/laws``, and more."""
-    found = read_yaml(PARAMS / 'laws' / f'{file}.yaml', 'controller')
-    found.update({name.replace('__', '.'): value for name, value in overrides.items()})
-    return build(ControllerParameters, found)
+    found = from_yaml(ControllerParameters, 'controller', PARAMS / 'laws' / f'{file}.yaml')
+    return replace(found, {name.replace('__', '.'): value for name, value in overrides.items()})
 
 
 def design(file: str, axis: str, **overrides: object) -> AxisDesign:
@@ -182,9 +181,8 @@ def test_linearisation_is_that_of_the_full_model(gap: float) -> None:
         wanted = np.zeros(5)
         wanted[axis] = 1e-4
         direct, quadrature, realised, excess = (np.zeros(n) for n in (4, 4, 5, 2))
-        saturated = equilibrium_inverse(
-            MACHINE, limits, np.ones(5), gap, wanted, direct, quadrature, realised, excess
-        )
+        answer = Answer(direct, quadrature, realised, excess)
+        saturated = equilibrium_inverse(MACHINE, limits, np.ones(5), gap, wanted, answer)
         assert not saturated
         np.testing.assert_allclose(realised, wanted, atol=1e-13)
         np.testing.assert_allclose(accelerate(state, direct, quadrature), wanted, atol=2e-8)
@@ -195,17 +193,9 @@ def test_linearisation_is_that_of_the_full_model(gap: float) -> None:
 def test_what_the_linear_inverse_says_it_realises(wanted: list[float]) -> None:
     """Within limits always, and with the currents it returns its own linear model agrees."""
     direct, quadrature, realised, excess = (np.zeros(n) for n in (4, 4, 5, 2))
-    saturated = equilibrium_inverse(
-        MACHINE,
-        CurrentLimits(7.0, 0.0, 0.0),
-        np.ones(5),
-        0.025,
-        np.array(wanted),
-        direct,
-        quadrature,
-        realised,
-        excess,
-    )
+    answer = Answer(direct, quadrature, realised, excess)
+    limits = CurrentLimits(7.0, 0.0, 0.0)
+    saturated = equilibrium_inverse(MACHINE, limits, np.ones(5), 0.025, np.array(wanted), answer)
     assert np.abs(direct).max() <= 7.0
     assert np.abs(quadrature).max() <= 7.0
     if saturated:

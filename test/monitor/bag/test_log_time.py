@@ -25,7 +25,20 @@ def test_samples_in_lockstep_are_recorded_at_their_stage_time(
     clock = LogTimes()
     assert times(clock, encoder, run, 'measurement') == run.stage_time[:3].tolist()
     assert times(clock, encoder, run, key) == run.stage_time[:3].tolist()
-    assert clock.of('diagnostic_msgs/msg/DiagnosticArray', [(b'', 7)]) == [(b'', 7)]
+
+
+def test_in_lockstep_other_messages_are_recorded_at_stage_time_too(run: Any, encoder: Any) -> None:
+    clock, stage = LogTimes(), run.stage_time
+
+    def others(*received: int) -> list[int]:
+        messages = [(b'', time) for time in received]
+        return [time for _, time in clock.of('rcl_interfaces/msg/Log', messages)]
+
+    assert others(2) == [2]  # there is no stage time yet
+    times(clock, encoder, run, 'measurement')
+    assert others(4, 5, 6, 90) == [4, stage[0], stage[1], stage[2]]
+    clock.of(TOPICS['measurement'][1], [(encoder.message(run, 'measurement', 3), 100)])
+    assert others(99, 100) == [stage[2], stage[3]]  # a burst later
 
 
 @pytest.mark.parametrize('key', TOPICS)
@@ -33,6 +46,7 @@ def test_samples_in_real_time_are_recorded_when_they_come(key: str, run: Any, en
     encoder, clock = Encoder(lockstep=False), LogTimes()
     assert times(clock, encoder, run, 'measurement') == [5, 6, 7]
     assert times(clock, encoder, run, key) == [5, 6, 7]
+    assert clock.of('diagnostic_msgs/msg/DiagnosticArray', [(b'', 7)]) == [(b'', 7)]
 
 
 def test_without_a_measurement_or_a_stamp_it_is_when_they_come(run: Any, encoder: Any) -> None:

@@ -7,7 +7,9 @@ import math
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import NoReturn
 
+from maglev_model.command import leave_with
 from maglev_monitor.bag.compare import TopicComparison, compare
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.reader import Bag
@@ -44,9 +46,9 @@ def compare_bags(arguments: Sequence[str] | None = None) -> int:
     return EQUAL if equal else DIFFERENT
 
 
-def main() -> None:
+def main() -> NoReturn:
     """Entry point of the executable."""
-    sys.exit(compare_bags())
+    leave_with(compare_bags)
 
 
 _ALL = tuple(TOPIC_TYPES)

@@ -6,7 +6,9 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NoReturn
 
+from maglev_model.command import leave_with
 from maglev_monitor.bag.analysis import Analysis, analyse
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.metrics.result_file import write_metrics
@@ -27,7 +29,6 @@ def analyze(arguments: Sequence[str] | None = None) -> int:
     except BagError as error:
         print(f'analyze: error: {error}', file=sys.stderr)
         return BAD_BAG
-    print(as_text(analysis.result))
     for note in analysis.notes:
         print(f'analyze: {note}', file=sys.stderr)
     folder = options.out or _beside(options.bag)
@@ -36,15 +37,16 @@ def analyze(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         print(f"analyze: error: cannot write to '{folder}': {error.strerror}", file=sys.stderr)
         return BAD_BAG
+    print(as_text(analysis.result))
     print(f'report: {folder / "report.html"}')
     if analysis.notes:
         return BAD_BAG
     return PASS if analysis.result['verdict'] == 'pass' else NOT_PASSED
 
 
-def main() -> None:
+def main() -> NoReturn:
     """Entry point of the executable."""
-    sys.exit(analyze())
+    leave_with(analyze)
 
 
 def _parser() -> argparse.ArgumentParser:

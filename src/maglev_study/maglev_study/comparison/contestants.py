@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from maglev_controller.laws import find_law
 from maglev_controller.parameters import ControllerParameters
-from maglev_model.parameters import ParameterError, build, read_yaml
+from maglev_model.parameters import ParameterError, from_yaml, replace
 from maglev_plant.parameters import PlantParameters
 
 
 @dataclasses.dataclass(frozen=True)
 class Contestant:
-    """One law: its regulator's parameters, and what they ask of the stage, by full name."""
+    """One law: its regulator's parameters, and those of the stage it flies."""
 
     name: str
     controller: ControllerParameters
-    plant: Mapping[str, object]
+    plant: PlantParameters
 
     @property
     def tilts(self) -> bool:
@@ -28,21 +28,25 @@ class Contestant:
     def stage(self, **overrides: object) -> PlantParameters:
         """The stage's parameters with further ones, whose dots are written as ``__``."""
         named = {name.replace('__', '.'): value for name, value in overrides.items()}
-        return build(PlantParameters, {**self.plant, **named})
+        return replace(self.plant, named)
 
 
-def find_contestants(params: Path, names: Sequence[str] = ()) -> list[Contestant]:
+def find_contestants(
+    params: Path, names: Sequence[str] = (), overlays: Sequence[Path] = ()
+) -> list[Contestant]:
     """The laws of a folder of parameters, or those named, on the benchmark plant.
 
     They come in the order of the paper's references, then others, the paper's own and the default.
 
     Each file of ``params/laws`` is one; ``paper`` is ``params/paper.yaml``, ``default`` has no file
-    but ``params/controller.yaml``. Raises :class:`ParameterError` for a name that is none of them,
-    and for a file that cannot be used.
+    but ``params/controller.yaml``. ``overlays`` are parameter files over those of every law, the
+    last one wins. Raises :class:`ParameterError` for a name that is none of them, and for a file
+    that cannot be used.
     """
     files = {path.stem: path for path in sorted((params / 'laws').glob('*.yaml'))}
     files |= {'paper': params / 'paper.yaml', 'default': params / 'controller.yaml'}
-    everyone = sorted((_contestant(params, *item) for item in files.items()), key=_place)
+    found = (_contestant(params, name, path, overlays) for name, path in files.items())
+    everyone = sorted(found, key=_place)
     for name in names:
         if name not in files:
             known = ', '.join(one.name for one in everyone)
@@ -57,8 +61,12 @@ def _place(contestant: Contestant) -> tuple[bool, tuple[int, ...], int, str]:
     return not references, references, rank, contestant.name
 
 
-def _contestant(params: Path, name: str, path: Path) -> Contestant:
-    controller = {**read_yaml(params / 'controller.yaml', 'controller')}
-    controller.update(read_yaml(path, 'controller'))
-    plant = {**read_yaml(params / 'benchmark.yaml', 'plant'), **read_yaml(path, 'plant')}
-    return Contestant(name, build(ControllerParameters, controller), plant)
+def _contestant(params: Path, name: str, path: Path, overlays: Sequence[Path]) -> Contestant:
+    machine, over = params / 'machine.yaml', (path, *overlays)
+    controller = machine, params / 'controller.yaml', *over
+    plant = machine, params / 'benchmark.yaml', *over
+    return Contestant(
+        name,
+        from_yaml(ControllerParameters, 'controller', *controller),
+        from_yaml(PlantParameters, 'plant', *plant),
+    )

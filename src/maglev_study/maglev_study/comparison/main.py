@@ -10,10 +10,11 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 from maglev_controller.laws import control_law, find_law
 from maglev_model.axes import THETA, X, Y
+from maglev_model.command import leave_with
 from maglev_model.parameters import ParameterError, replace
 from maglev_study.closed_loop import warm_up
 from maglev_study.comparison.contestants import Contestant, find_contestants
@@ -31,8 +32,13 @@ class Part(NamedTuple):
     arguments: tuple[Any, ...]
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point of the executable ``compare``; the exit code."""
+def main() -> NoReturn:
+    """Entry point of the executable ``compare``."""
+    leave_with(compare)
+
+
+def compare(arguments: Sequence[str] | None = None) -> int:
+    """Run the command and return its exit code."""
     options = _parser().parse_args(arguments)
     try:
         contestants = _contestants(options)
@@ -52,7 +58,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print('\n' + text + '\n', flush=True)
     from maglev_study.comparison.plot import draw_regions
 
-    facts = {'quick': options.quick, 'bandwidth': options.bandwidth}
+    facts = {
+        'quick': options.quick,
+        'bandwidth': options.bandwidth,
+        'overlays': [str(path) for path in options.overlay],
+    }
     (out / 'comparison.txt').write_text(text + '\n', encoding='utf-8')
     (out / 'comparison.json').write_text(to_json(rows, regions, facts), encoding='utf-8')
     draw_regions(regions, out / 'regions.png')
@@ -65,6 +75,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog='compare', description=__doc__)
     parser.add_argument('--params', type=Path, required=True, help='the folder of parameter files')
+    parser.add_argument(
+        '--overlay',
+        type=Path,
+        action='append',
+        default=[],
+        metavar='FILE',
+        help="parameters of controller and plant over every law's own; repeatable, the last wins",
+    )
     parser.add_argument('--out', type=Path, required=True, help='where the results are left')
     parser.add_argument('--quick', action='store_true', help='coarse regions, short windows')
     parser.add_argument(
@@ -80,7 +98,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _contestants(options: argparse.Namespace) -> list[Contestant]:
-    found = find_contestants(options.params, options.laws)
+    found = find_contestants(options.params, options.laws, options.overlay)
     if options.bandwidth is not None:
         change = {'compensator.crossover': (options.bandwidth,) * 5}
         found = [
@@ -146,4 +164,4 @@ def _run(pool: Executor, parts: Sequence[Part]) -> dict[tuple[str, str], Any]:
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    main()
