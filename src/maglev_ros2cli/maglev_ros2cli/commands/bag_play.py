@@ -11,11 +11,10 @@ from rosbags.interfaces import Connection, ConnectionExtRosbag2
 from rosbags.rosbag2 import Reader
 from rosgraph_msgs.msg import Clock
 
-from maglev_node.polling import PollingNode
 from maglev_node.stamp import set_stamp
 from maglev_ros2cli.bags import add_bag_path, add_overrides, opened, overrides, profile
 from maglev_ros2cli.errors import CommandError
-from maglev_ros2cli.graph import discover, node
+from maglev_ros2cli.graph import GraphNode, discover, node
 from maglev_ros2cli.messages import find_type
 from maglev_ros2cli.parser import Verbs
 
@@ -69,7 +68,7 @@ def play(arguments: Any) -> None:
 class _Player:
     """The publishers for a bag."""
 
-    def __init__(self, own: PollingNode, reader: Reader, arguments: Any) -> None:
+    def __init__(self, own: GraphNode, reader: Reader, arguments: Any) -> None:
         self._reader = reader
         self._rate = arguments.rate
         self._start = reader.start_time + int(arguments.start_offset * 1e9)

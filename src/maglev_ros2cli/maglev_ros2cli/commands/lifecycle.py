@@ -8,14 +8,16 @@ from typing import Any
 from lifecycle_msgs.msg import TransitionDescription
 from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
 
-from maglev_node.polling import PollingNode
 from maglev_ros2cli.errors import CommandError
 from maglev_ros2cli.graph import (
+    GraphNode,
     add_arguments,
     add_node_name,
-    call,
-    find_node,
+    answer,
+    ask,
+    client,
     graph,
+    graph_with,
     nodes,
     services,
 )
@@ -39,8 +41,7 @@ def add(parser: Parser) -> None:
     transition = verb.add_argument('transition', help='The lifecycle transition')
 
     def known(given: Any) -> list[str]:
-        with graph(given) as own:
-            full = find_node(own, given.node_name).full
+        with graph_with(given) as (own, full):
             return [each.transition.label for each in _transitions(own, full)]
 
     complete(transition, known)
@@ -69,22 +70,23 @@ def nodes_(arguments: Any) -> None:
 
 def get(arguments: Any) -> None:
     """The state of one managed node, or of all."""
+    if arguments.node_name:
+        with graph_with(arguments) as (own, full):
+            print(_state(own, full))
+        return
     with graph(arguments) as own:
-        hidden = arguments.include_hidden_nodes
-        if arguments.node_name:
-            found = [find_node(own, arguments.node_name, hidden=hidden).full]
-        else:
-            found = _managed(own, hidden=hidden)
-        for full in found:
-            state = call(own, GetState, f'{full}/get_state', GetState.Request()).current_state
-            prefix = '' if arguments.node_name else f'{full}: '
-            print(f'{prefix}{state.label} [{state.id}]')
+        for full in _managed(own, hidden=arguments.include_hidden_nodes):
+            print(f'{full}: {_state(own, full)}')
+
+
+def _state(own: GraphNode, full: str) -> str:
+    state = ask(own, GetState, f'{full}/get_state', GetState.Request()).current_state
+    return f'{state.label} [{state.id}]'
 
 
 def list_(arguments: Any) -> None:
     """The transitions a node has from its state."""
-    with graph(arguments) as own:
-        full = find_node(own, arguments.node_name, hidden=arguments.include_hidden_nodes).full
+    with graph_with(arguments) as (own, full):
         for each in _transitions(own, full):
             print(f'- {each.transition.label} [{each.transition.id}]')
             print(f'\tStart: {each.start_state.label}')
@@ -93,8 +95,7 @@ def list_(arguments: Any) -> None:
 
 def set_(arguments: Any) -> None:
     """A transition by its label or number; one that fails is said on stderr, with exit code 0."""
-    with graph(arguments) as own:
-        full = find_node(own, arguments.node_name, hidden=arguments.include_hidden_nodes).full
+    with graph_with(arguments) as (own, full):
         known = [each.transition for each in _transitions(own, full)]
         for transition in known:
             if arguments.transition in (transition.label, str(transition.id)):
@@ -109,20 +110,20 @@ def set_(arguments: Any) -> None:
                 )
             )
         request = ChangeState.Request(transition=transition)
-        done = call(own, ChangeState, f'{full}/change_state', request).success
+        done = answer(own, client(own, ChangeState, f'{full}/change_state'), request).success
     if done:
         print('Transitioning successful')
     else:
         print('Transitioning failed', file=sys.stderr)
 
 
-def _managed(own: PollingNode, *, hidden: bool) -> list[str]:
+def _managed(own: GraphNode, *, hidden: bool) -> list[str]:
     there = services(own)
     found = dict.fromkeys(each.full for each in nodes(own, hidden=hidden))
     return [full for full in found if _GET_STATE in there.get(f'{full}/get_state', ())]
 
 
-def _transitions(own: PollingNode, full: str) -> list[TransitionDescription]:
+def _transitions(own: GraphNode, full: str) -> list[TransitionDescription]:
     service = f'{full}/get_available_transitions'
     request = GetAvailableTransitions.Request()
-    return list(call(own, GetAvailableTransitions, service, request).available_transitions)
+    return list(ask(own, GetAvailableTransitions, service, request).available_transitions)

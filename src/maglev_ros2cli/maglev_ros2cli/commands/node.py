@@ -11,9 +11,16 @@ from rclpy.action import (
 )
 from rclpy.topic_or_service_is_hidden import topic_or_service_is_hidden
 
-from maglev_node.polling import PollingNode
 from maglev_ros2cli.errors import CommandError
-from maglev_ros2cli.graph import absolute, add_arguments, add_node_name, graph, nodes
+from maglev_ros2cli.graph import (
+    GraphNode,
+    NodeName,
+    absolute,
+    add_arguments,
+    add_node_name,
+    graph,
+    nodes,
+)
 from maglev_ros2cli.parser import Parser, Verbs
 
 
@@ -54,8 +61,12 @@ def list_(arguments: Any) -> None:
 def info(arguments: Any) -> None:
     """A node's topics, services and actions."""
     full = absolute(arguments.node_name)
-    with graph(arguments) as own:
-        same = [each for each in nodes(own, hidden=True) if each.full == full]
+
+    def same_name(own: GraphNode) -> list[NodeName]:
+        return [each for each in nodes(own, hidden=True) if each.full == full]
+
+    with graph(arguments, same_name) as own:
+        same = same_name(own)
         if not same:
             raise CommandError(f"Unable to find node '{arguments.node_name}'")
         if len(same) > 1:
@@ -75,7 +86,7 @@ def info(arguments: Any) -> None:
             print('\n'.join(lines))
 
 
-def _parts(own: PollingNode, name: str, namespace: str) -> dict[str, list[tuple[str, list[str]]]]:
+def _parts(own: GraphNode, name: str, namespace: str) -> dict[str, list[tuple[str, list[str]]]]:
     return {
         'Subscribers': own.get_subscriber_names_and_types_by_node(name, namespace),
         'Publishers': own.get_publisher_names_and_types_by_node(name, namespace),

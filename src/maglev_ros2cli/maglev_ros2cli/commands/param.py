@@ -15,14 +15,14 @@ from rclpy.parameter import (
     parameter_value_to_python,
 )
 
-from maglev_node.polling import PollingNode
 from maglev_ros2cli.errors import CommandError
 from maglev_ros2cli.graph import (
+    GraphNode,
     add_arguments,
     add_node_name,
-    call,
-    find_node,
+    ask,
     graph,
+    graph_with,
     nodes,
     services,
 )
@@ -81,40 +81,41 @@ def _add_parameter_name(verb: Parser, name: str, **options: Any) -> None:
     argument = verb.add_argument(name, help='Name of the parameter', **options)
 
     def known(given: Any) -> list[str]:
-        with graph(given) as own:
-            return _names(own, find_node(own, given.node_name).full)
+        with graph_with(given) as (own, full):
+            return _names(own, full)
 
     complete(argument, known)
 
 
 def list_(arguments: Any) -> None:
     """The parameters of one node, or of all that have some."""
+    if arguments.node_name:
+        with graph_with(arguments) as (own, full):
+            _print_names(own, full, arguments)
+        return
     with graph(arguments) as own:
-        hidden = arguments.include_hidden_nodes
-        if arguments.node_name:
-            known = [find_node(own, arguments.node_name, hidden=hidden).full]
-        else:
-            there = services(own)
-            found = dict.fromkeys(each.full for each in nodes(own, hidden=hidden))
-            known = [full for full in found if f'{full}/list_parameters' in there]
-        for full in known:
-            names = _names(own, full, arguments.param_prefixes)
-            if not arguments.node_name:
-                print(f'{full}:')
-            types = _types(own, full, names) if arguments.param_type else {}
-            for name in names:
-                print(f'  {name} (type: {types[name]})' if types else f'  {name}')
+        there = services(own)
+        for name in nodes(own, hidden=arguments.include_hidden_nodes):
+            if f'{name.full}/list_parameters' in there:
+                print(f'{name.full}:')
+                _print_names(own, name.full, arguments)
+
+
+def _print_names(own: GraphNode, full: str, arguments: Any) -> None:
+    names = _names(own, full, arguments.param_prefixes)
+    types = _types(own, full, names) if arguments.param_type else {}
+    for name in names:
+        print(f'  {name} (type: {types[name]})' if types else f'  {name}')
 
 
 def get(arguments: Any) -> None:
     """One value."""
-    with graph(arguments) as own:
-        full = find_node(own, arguments.node_name, hidden=arguments.include_hidden_nodes).full
+    with graph_with(arguments) as (own, full):
         values = _values(own, full, [arguments.parameter_name])
     if not values:
         raise CommandError('Parameter not set')
     label = _TYPES[values[0].type][1]
-    value = _shown(values[0])
+    value = parameter_value_to_python(values[0])
     if arguments.hide_type:
         print(value)
     else:
@@ -124,16 +125,14 @@ def get(arguments: Any) -> None:
 def set_(arguments: Any) -> None:
     """One value; what the node refuses is said on stderr, with exit code 0 as in ros2cli."""
     parameter = Parameter(name=arguments.parameter_name, value=get_parameter_value(arguments.value))
-    with graph(arguments) as own:
-        full = find_node(own, arguments.node_name, hidden=arguments.include_hidden_nodes).full
+    with graph_with(arguments) as (own, full):
         (result,) = _set(own, full, [parameter])
     _tell(result, 'Set parameter successful', 'Setting parameter failed')
 
 
 def load(arguments: Any) -> None:
     """All that a file gives for a node."""
-    with graph(arguments) as own:
-        full = find_node(own, arguments.node_name, hidden=arguments.include_hidden_nodes).full
+    with graph_with(arguments) as (own, full):
         try:
             given = parameter_dict_from_yaml_file(
                 str(arguments.parameter_file), not arguments.no_use_wildcard, [full]
@@ -149,8 +148,7 @@ def load(arguments: Any) -> None:
 
 def describe(arguments: Any) -> None:
     """Type, text and bounds of parameters."""
-    with graph(arguments) as own:
-        full = find_node(own, arguments.node_name, hidden=arguments.include_hidden_nodes).full
+    with graph_with(arguments) as (own, full):
         descriptors = _descriptors(own, full, arguments.parameter_names)
     for descriptor in descriptors:
         print('\n'.join(_description(descriptor)))
@@ -158,8 +156,7 @@ def describe(arguments: Any) -> None:
 
 def dump(arguments: Any) -> None:
     """All parameters of a node, as a parameter file."""
-    with graph(arguments) as own:
-        full = find_node(own, arguments.node_name, hidden=arguments.include_hidden_nodes).full
+    with graph_with(arguments) as (own, full):
         names = _names(own, full)
         values = _values(own, full, names)
     tree: dict[str, Any] = {}
@@ -176,37 +173,32 @@ def dump(arguments: Any) -> None:
 # -- services --------------------------------------------------------------------------------------
 
 
-def _names(own: PollingNode, full: str, prefixes: tuple[str, ...] = ()) -> list[str]:
+def _names(own: GraphNode, full: str, prefixes: tuple[str, ...] = ()) -> list[str]:
     request = ListParameters.Request(prefixes=list(prefixes))
-    response = call(own, ListParameters, f'{full}/list_parameters', request)
+    response = ask(own, ListParameters, f'{full}/list_parameters', request)
     return sorted(response.result.names)
 
 
-def _values(own: PollingNode, full: str, names: list[str]) -> list[Any]:
+def _values(own: GraphNode, full: str, names: list[str]) -> list[Any]:
     request = GetParameters.Request(names=names)
-    return list(call(own, GetParameters, f'{full}/get_parameters', request).values)
+    return list(ask(own, GetParameters, f'{full}/get_parameters', request).values)
 
 
-def _set(own: PollingNode, full: str, parameters: list[Parameter]) -> list[SetParametersResult]:
+def _set(own: GraphNode, full: str, parameters: list[Parameter]) -> list[SetParametersResult]:
     request = SetParameters.Request(parameters=parameters)
-    return list(call(own, SetParameters, f'{full}/set_parameters', request).results)
+    return list(ask(own, SetParameters, f'{full}/set_parameters', request).results)
 
 
-def _descriptors(own: PollingNode, full: str, names: list[str]) -> list[ParameterDescriptor]:
+def _descriptors(own: GraphNode, full: str, names: list[str]) -> list[ParameterDescriptor]:
     request = DescribeParameters.Request(names=names)
-    return list(call(own, DescribeParameters, f'{full}/describe_parameters', request).descriptors)
+    return list(ask(own, DescribeParameters, f'{full}/describe_parameters', request).descriptors)
 
 
-def _types(own: PollingNode, full: str, names: list[str]) -> dict[str, str]:
+def _types(own: GraphNode, full: str, names: list[str]) -> dict[str, str]:
     return {each.name: _TYPES[each.type][0] for each in _descriptors(own, full, names)}
 
 
 # -- output ----------------------------------------------------------------------------------------
-
-
-def _shown(value: Any) -> Any:
-    """A value as ros2cli prints it."""
-    return parameter_value_to_python(value)
 
 
 def _tell(result: SetParametersResult, success: str, failure: str) -> None:

@@ -64,10 +64,11 @@ def list_(arguments: Any) -> None:
 
 def type_(arguments: Any) -> int:
     """The type of one service; of an unknown one exit code 1 and no word, as in ros2cli."""
-    with graph(arguments) as own:
-        types = services(own).get(absolute(arguments.service_name))
-    for name in types or ():
-        print(name)
+    name = absolute(arguments.service_name)
+    with graph(arguments, lambda own: name in services(own)) as own:
+        types = services(own).get(name)
+    for each in types or ():
+        print(each)
     return 0 if types else 1
 
 

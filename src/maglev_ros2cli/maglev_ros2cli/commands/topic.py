@@ -67,7 +67,7 @@ def _print_counts(
 def info(arguments: Any) -> None:
     """Type and endpoints of a topic."""
     name = absolute(arguments.topic_name)
-    with graph(arguments) as own:
+    with graph(arguments, lambda own: name in topics(own)) as own:
         types = topics(own).get(name)
         if types is None:
             raise CommandError(f"Unknown topic '{arguments.topic_name}'")
@@ -85,8 +85,9 @@ def info(arguments: Any) -> None:
 
 def type_(arguments: Any) -> int:
     """The type of one topic; of an unknown one exit code 1 and no word, as in ros2cli."""
-    with graph(arguments) as own:
-        types = topics(own).get(absolute(arguments.topic_name))
-    for name in types or ():
-        print(name)
+    name = absolute(arguments.topic_name)
+    with graph(arguments, lambda own: name in topics(own)) as own:
+        types = topics(own).get(name)
+    for each in types or ():
+        print(each)
     return 0 if types else 1

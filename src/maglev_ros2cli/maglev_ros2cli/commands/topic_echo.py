@@ -7,10 +7,9 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from maglev_node.polling import PollingNode
 from maglev_ros2cli import qos
 from maglev_ros2cli.errors import CommandError
-from maglev_ros2cli.graph import absolute, add_arguments, add_topic_name, graph, topics
+from maglev_ros2cli.graph import GraphNode, absolute, add_arguments, add_topic_name, graph, topics
 from maglev_ros2cli.messages import Form, as_csv, as_yaml, find_type
 from maglev_ros2cli.parser import Verbs
 
@@ -58,8 +57,8 @@ def echo(arguments: Any) -> None:
         flow=arguments.flow_style,
     )
     wanted = _filter(arguments.filter)
-    with graph(arguments) as own:
-        topic = absolute(arguments.topic_name)
+    topic = absolute(arguments.topic_name)
+    with graph(arguments, lambda own: own.count_publishers(topic)) as own:
         kind = find_type(arguments.message_type or the_type(own, topic), 'msg')
         for message, _ in heard(own, topic, kind, arguments):
             if arguments.raw:
@@ -73,7 +72,7 @@ def echo(arguments: Any) -> None:
                 return
 
 
-def the_type(own: PollingNode, topic: str) -> str:
+def the_type(own: GraphNode, topic: str) -> str:
     """The type of a topic's messages. Raises :class:`CommandError` when there is not one."""
     types = topics(own).get(topic)
     if not types:
@@ -87,7 +86,7 @@ def the_type(own: PollingNode, topic: str) -> str:
 
 
 def heard(
-    own: PollingNode, topic: str, kind: type, arguments: Any, *, raw: bool = False
+    own: GraphNode, topic: str, kind: type, arguments: Any, *, raw: bool = False
 ) -> Iterator[tuple[Any, int]]:
     """Messages of a topic with their times of reception [ns], None when there is none now."""
     profile = qos.to_hear(own, topic, arguments)

@@ -39,7 +39,7 @@ def add(verbs: Verbs) -> None:
 def hz(arguments: Any) -> None:
     """Print rate and intervals once a second, by the times of reception."""
     topic = absolute(arguments.topic_name)
-    with graph(arguments) as own:
+    with graph(arguments, lambda own: own.count_publishers(topic)) as own:
         if topic not in topics(own):
             print(f'WARNING: topic [{topic}] does not appear to be published yet')
             wait_until(lambda: topic in topics(own))
