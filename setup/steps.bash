@@ -165,6 +165,14 @@ __maglev_first() { # NAME ENTRY...
   rest=$ours${rest%:}
   export "$name=${rest%:}"
 }
+__maglev_last() { # NAME ENTRY
+  local rest=":${!1-}:"
+  while [[ $rest == *":$2:"* ]]; do
+    rest=${rest/":$2:"/:}
+  done
+  rest=${rest#:}
+  export "$1=$rest$2"
+}
 END
     in_underlay bash -c ". '$root/install/local_setup.bash' && env -0" |
       while IFS='=' read -rd '' name value; do
@@ -183,10 +191,11 @@ END
     first PATH "$cache/test-tools/bin"
     first PYTHONPATH "$cache/test-tools"
     echo 'fi'
+    [[ $branch == native ]] || small_ros2
     default ROS_AUTOMATIC_DISCOVERY_RANGE LOCALHOST
     default OPENBLAS_NUM_THREADS 1
     default OMP_NUM_THREADS 1
-    echo 'unset -f __maglev_first'
+    echo 'unset -f __maglev_first __maglev_last'
   } >"$file.new"
   mv -f -- "$file.new" "$file"
   mkdir -p -- "$cache/numba"
@@ -194,6 +203,12 @@ END
   in_environment python -c 'import maglev_msgs.msg, matplotlib, numba, rclpy, rosbags, scipy
 rclpy.init()
 rclpy.shutdown()'
+}
+
+# The wheels have no ros2 command. Ours comes last: a real one that is on PATH is the one that is run.
+small_ros2() {
+  printf '__maglev_last PATH %q\n' "$root/install/maglev_ros2cli/lib/maglev_ros2cli"
+  in_underlay "$venv/bin/register-python-argcomplete" --shell bash ros2
 }
 
 setting() { printf 'export %s=%q\n' "$1" "$2"; }

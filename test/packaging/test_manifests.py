@@ -16,7 +16,16 @@ DISTRIBUTIONS = {'yaml': 'PyYAML', 'mpl_toolkits': 'matplotlib', 'mcap_ros2': 'm
 
 KEYS = {
     name: f'python3-{name.lower().removeprefix("py") if name == "PyYAML" else name}'
-    for name in ('PyYAML', 'hypothesis', 'matplotlib', 'numpy', 'psutil', 'pytest', 'scipy')
+    for name in (
+        'PyYAML',
+        'argcomplete',
+        'hypothesis',
+        'matplotlib',
+        'numpy',
+        'psutil',
+        'pytest',
+        'scipy',
+    )
 }
 """The rosdep keys that Ubuntu 24.04 has, by names on PyPI."""
 

@@ -1,0 +1,1 @@
+"""The commands: each module's ``add`` gives its verbs to a parser."""

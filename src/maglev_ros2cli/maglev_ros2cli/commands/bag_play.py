@@ -1,0 +1,157 @@
+"""``ros2 bag play``: publish what is in a bag."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from typing import Any
+
+from rclpy.duration import Duration
+from rosbags.interfaces import Connection, ConnectionExtRosbag2
+from rosbags.rosbag2 import Reader
+from rosgraph_msgs.msg import Clock
+
+from maglev_node.stamp import set_stamp
+from maglev_ros2cli.bags import add_bag_path, add_overrides, opened, overrides, profile
+from maglev_ros2cli.errors import CommandError
+from maglev_ros2cli.graph import GraphNode, discover, node
+from maglev_ros2cli.messages import find_type
+from maglev_ros2cli.parser import Verbs
+
+_CLOCK_RATE = 40.0
+_DISCOVERY = 0.5
+"""Time in which subscribers find the publishers before the first message [s]."""
+_DELIVERY = 1.0
+
+
+def add(verbs: Verbs) -> None:
+    """Give the verb to its command."""
+    verb = verbs.add('play', play, 'Play back ROS data from a bag')
+    add_bag_path(verb)
+    verb.add_argument('-r', '--rate', type=_positive, default=1.0, help='Rate at which to play')
+    verb.add_argument('-l', '--loop', action='store_true', help='Play again when it has ended')
+    verb.add_argument('--topics', nargs='+', metavar='TOPIC', help='To replay (default: all)')
+    verb.add_argument('-m', '--remap', nargs='+', default=[], metavar='OLD:=NEW', help='New names')
+    verb.add_argument(
+        '--clock',
+        type=_positive,
+        nargs='?',
+        const=_CLOCK_RATE,
+        metavar='HZ',
+        help=f'Publish to /clock at a rate, by default {_CLOCK_RATE:g} Hz',
+    )
+    verb.add_argument('-d', '--delay', type=float, default=0.0, help='Sleep SEC before play')
+    verb.add_argument(
+        '--start-offset', type=float, default=0.0, help='Start from this many seconds into the bag'
+    )
+    verb.add_argument(
+        '--disable-keyboard-controls', action='store_true', help='As ever: there are none'
+    )
+    add_overrides(verb)
+
+
+def play(arguments: Any) -> None:
+    """Publish to the end of the bag, again and again with ``--loop``, or until interrupted."""
+    with opened(arguments.bag_path) as reader, node('rosbag2_player') as own:
+        own.get_logger().info(f'Set rate to {arguments.rate:g}')
+        player = _Player(own, reader, arguments)
+        discover(own, max(_DISCOVERY, arguments.delay))
+        try:
+            player.play()
+            while arguments.loop:
+                player.play()
+            player.deliver()
+        except KeyboardInterrupt:
+            own.get_logger().info('Stopping playback.')
+
+
+class _Player:
+    """The publishers for a bag."""
+
+    def __init__(self, own: GraphNode, reader: Reader, arguments: Any) -> None:
+        self._reader = reader
+        self._rate = arguments.rate
+        self._start = reader.start_time + int(arguments.start_offset * 1e9)
+        self._publishers = {}
+        renamed = _renamed(arguments.remap)
+        given = overrides(arguments.qos_profile_overrides_path)
+        for connection in reader.connections:
+            topic = connection.topic
+            if arguments.topics and topic not in arguments.topics:
+                continue
+            try:
+                kind = find_type(connection.msgtype, 'msg')
+            except CommandError as error:
+                own.get_logger().warning(f"Ignoring a topic '{topic}', reason: {error}")
+                continue
+            qos = given.get(topic) or _recorded(connection)
+            name = renamed.get(topic, topic)
+            self._publishers[connection.id] = own.create_publisher(kind, name, qos)
+        self._period = 1.0 / arguments.clock if arguments.clock else None
+        self._ticked = 0.0
+        self._clock = own.create_publisher(Clock, '/clock', 10) if self._period else None
+
+    def play(self) -> None:
+        """Publish each message at its time."""
+        wall = time.monotonic()
+        for connection, stamp, data in self._messages():
+            self._wait(wall, stamp)
+            self._publishers[connection.id].publish(bytes(data))
+
+    def deliver(self) -> None:
+        """Give the last messages the time to arrive."""
+        end = time.monotonic() + _DELIVERY
+        for publisher in self._publishers.values():
+            left = max(0.0, end - time.monotonic())
+            publisher.wait_for_all_acked(Duration(seconds=left))
+
+    def _messages(self) -> Iterator[tuple[Connection, int, bytes]]:
+        played = [each for each in self._reader.connections if each.id in self._publishers]
+        return self._reader.messages(played, start=self._start) if played else iter(())
+
+    def _wait(self, wall: float, stamp: int) -> None:
+        """Wait for the time of a message, by a steady clock; publish ``/clock`` meanwhile."""
+        due = wall + (stamp - self._start) * 1e-9 / self._rate
+        while True:
+            now = time.monotonic()
+            if self._clock is not None:
+                self._tick(self._start + int((now - wall) * 1e9 * self._rate), now)
+            if now >= due:
+                return
+            time.sleep(min(due - now, self._period or due - now))
+
+    def _tick(self, stage_time: int, now: float) -> None:
+        assert self._clock is not None
+        assert self._period is not None
+        if now - self._ticked >= self._period:
+            self._ticked = now
+            message = Clock()
+            set_stamp(message.clock, stage_time)
+            self._clock.publish(message)
+
+
+def _recorded(connection: Connection) -> Any:
+    """The QoS that the topic's publishers offered, 10 messages where that is not known."""
+    offered = (
+        connection.ext.offered_qos_profiles
+        if isinstance(connection.ext, ConnectionExtRosbag2)
+        else []
+    )
+    return profile(offered[0]) if offered else 10
+
+
+def _renamed(rules: list[str]) -> dict[str, str]:
+    names = {}
+    for rule in rules:
+        old, sign, new = rule.partition(':=')
+        if not (old and sign and new):
+            raise CommandError(f"[ERROR] [ros2bag]: '{rule}' is no rule OLD:=NEW")
+        names[old] = new
+    return names
+
+
+def _positive(text: str) -> float:
+    value = float(text)
+    if not value > 0.0:
+        raise ValueError
+    return value

@@ -1,0 +1,129 @@
+"""``ros2 lifecycle``: the states of managed nodes."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+from lifecycle_msgs.msg import TransitionDescription
+from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
+
+from maglev_ros2cli.errors import CommandError
+from maglev_ros2cli.graph import (
+    GraphNode,
+    add_arguments,
+    add_node_name,
+    answer,
+    ask,
+    client,
+    graph,
+    graph_with,
+    nodes,
+    services,
+)
+from maglev_ros2cli.parser import Parser, Verbs, complete
+
+_GET_STATE = 'lifecycle_msgs/srv/GetState'
+
+
+def add(parser: Parser) -> None:
+    """Give the verbs to a parser."""
+    verbs = Verbs(parser)
+    _verb(verbs, 'get', get, 'Get lifecycle state for one or more nodes', nargs='?')
+    _verb(verbs, 'list', list_, 'Output a list of available transitions')
+    verb = verbs.add('nodes', nodes_, 'Output a list of nodes with lifecycle')
+    add_arguments(verb)
+    verb.add_argument('-a', '--all', action='store_true', help='Display all nodes, also hidden')
+    verb.add_argument(
+        '-c', '--count-nodes', action='store_true', help='Only display the number of nodes'
+    )
+    verb = _verb(verbs, 'set', set_, 'Trigger lifecycle state transition')
+    transition = verb.add_argument('transition', help='The lifecycle transition')
+
+    def known(given: Any) -> list[str]:
+        with graph_with(given) as (own, full):
+            return [each.transition.label for each in _transitions(own, full)]
+
+    complete(transition, known)
+
+
+def _verb(verbs: Verbs, name: str, run: Any, text: str, **node: Any) -> Parser:
+    verb = verbs.add(name, run, text)
+    add_arguments(verb)
+    add_node_name(verb, **node)
+    verb.add_argument(
+        '--include-hidden-nodes', action='store_true', help='Consider hidden nodes as well'
+    )
+    return verb
+
+
+def nodes_(arguments: Any) -> None:
+    """The managed nodes."""
+    with graph(arguments) as own:
+        names = _managed(own, hidden=arguments.all)
+    if arguments.count_nodes:
+        print(len(names))
+        return
+    for name in names:
+        print(name)
+
+
+def get(arguments: Any) -> None:
+    """The state of one managed node, or of all."""
+    if arguments.node_name:
+        with graph_with(arguments) as (own, full):
+            print(_state(own, full))
+        return
+    with graph(arguments) as own:
+        for full in _managed(own, hidden=arguments.include_hidden_nodes):
+            print(f'{full}: {_state(own, full)}')
+
+
+def _state(own: GraphNode, full: str) -> str:
+    state = ask(own, GetState, f'{full}/get_state', GetState.Request()).current_state
+    return f'{state.label} [{state.id}]'
+
+
+def list_(arguments: Any) -> None:
+    """The transitions a node has from its state."""
+    with graph_with(arguments) as (own, full):
+        for each in _transitions(own, full):
+            print(f'- {each.transition.label} [{each.transition.id}]')
+            print(f'\tStart: {each.start_state.label}')
+            print(f'\tGoal: {each.goal_state.label}')
+
+
+def set_(arguments: Any) -> None:
+    """A transition by its label or number; one that fails is said on stderr, with exit code 0."""
+    with graph_with(arguments) as (own, full):
+        known = [each.transition for each in _transitions(own, full)]
+        for transition in known:
+            if arguments.transition in (transition.label, str(transition.id)):
+                break
+        else:
+            raise CommandError(
+                '\n- '.join(
+                    [
+                        'Unknown transition requested, available ones are:',
+                        *(f'{each.label} [{each.id}]' for each in known),
+                    ]
+                )
+            )
+        request = ChangeState.Request(transition=transition)
+        done = answer(own, client(own, ChangeState, f'{full}/change_state'), request).success
+    if done:
+        print('Transitioning successful')
+    else:
+        print('Transitioning failed', file=sys.stderr)
+
+
+def _managed(own: GraphNode, *, hidden: bool) -> list[str]:
+    there = services(own)
+    found = dict.fromkeys(each.full for each in nodes(own, hidden=hidden))
+    return [full for full in found if _GET_STATE in there.get(f'{full}/get_state', ())]
+
+
+def _transitions(own: GraphNode, full: str) -> list[TransitionDescription]:
+    service = f'{full}/get_available_transitions'
+    request = GetAvailableTransitions.Request()
+    return list(ask(own, GetAvailableTransitions, service, request).available_transitions)

@@ -1,0 +1,95 @@
+"""``ros2 service``: the services on the graph, and calls of them."""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import Any
+
+from maglev_ros2cli.errors import CommandError
+from maglev_ros2cli.graph import (
+    absolute,
+    add_arguments,
+    add_service_name,
+    answer,
+    graph,
+    node,
+    services,
+    wait_until,
+)
+from maglev_ros2cli.interfaces import names
+from maglev_ros2cli.messages import fill, find_type, values_of
+from maglev_ros2cli.parser import Parser, Verbs, complete
+
+_FIRST_LOOK = 0.1
+"""How long a service may take to be seen without a word about it [s]."""
+
+
+def add(parser: Parser) -> None:
+    """Give the verbs to a parser."""
+    verbs = Verbs(parser)
+    verb = verbs.add('call', call, 'Call a service')
+    add_service_name(verb, "Name of the ROS service to call to (e.g. '/add_two_ints')")
+    kind = verb.add_argument('service_type', help="Type of the service ('std_srvs/srv/Empty')")
+    complete(kind, lambda _: names('srv'))
+    verb.add_argument(
+        'values', nargs='?', default='{}', help="The request's values in YAML: '{a: 1, b: 2}'"
+    )
+    verb.add_argument('--stdin', action='store_true', help='Read values from standard input')
+    verb.add_argument('-r', '--rate', type=float, metavar='N', help='Repeat the call at N Hz')
+    verb = verbs.add('list', list_, 'Output a list of available services')
+    add_arguments(verb)
+    verb.add_argument('-t', '--show-types', action='store_true', help='Also show the types')
+    verb.add_argument(
+        '-c', '--count-services', action='store_true', help='Only display the number of services'
+    )
+    verb.add_argument(
+        '-a', '--include-hidden-services', action='store_true', help='Also hidden services'
+    )
+    verb = verbs.add('type', type_, "Output a service's type")
+    add_arguments(verb)
+    add_service_name(verb, 'Name of the ROS service to get type (e.g. "/talker/list_parameters")')
+
+
+def list_(arguments: Any) -> None:
+    """All services, sorted."""
+    with graph(arguments) as own:
+        found = services(own, hidden=arguments.include_hidden_services)
+    if arguments.count_services:
+        print(len(found))
+        return
+    for name, types in found.items():
+        print(f'{name} [{", ".join(types)}]' if arguments.show_types else name)
+
+
+def type_(arguments: Any) -> int:
+    """The type of one service; of an unknown one exit code 1 and no word, as in ros2cli."""
+    name = absolute(arguments.service_name)
+    with graph(arguments, lambda own: name in services(own)) as own:
+        types = services(own).get(name)
+    for each in types or ():
+        print(each)
+    return 0 if types else 1
+
+
+def call(arguments: Any) -> None:
+    """Wait for a service, call it once or at a rate, and print each response."""
+    if arguments.rate is not None and arguments.rate <= 0:
+        raise CommandError('rate must be greater than zero')
+    kind = find_type(arguments.service_type, 'srv')
+    request = kind.Request()
+    stampers = fill(request, values_of(sys.stdin.read() if arguments.stdin else arguments.values))
+    with node() as own:
+        client = own.create_client(kind, arguments.service_name)
+        if not wait_until(client.service_is_ready, _FIRST_LOOK):
+            print('waiting for service to become available...')
+            wait_until(client.service_is_ready)
+        while True:
+            start = time.monotonic()
+            for stamp in stampers:
+                stamp(own.get_clock().now().to_msg())
+            print(f'requester: making request: {request!r}\n')
+            print(f'response:\n{answer(own, client, request)!r}\n')
+            if arguments.rate is None:
+                return
+            time.sleep(max(0.0, start + 1.0 / arguments.rate - time.monotonic()))

@@ -1,0 +1,134 @@
+"""``ros2 topic echo``: print the messages of a topic."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from maglev_ros2cli import qos
+from maglev_ros2cli.errors import CommandError
+from maglev_ros2cli.graph import GraphNode, absolute, add_arguments, add_topic_name, graph, topics
+from maglev_ros2cli.messages import Form, as_csv, as_yaml, find_type
+from maglev_ros2cli.parser import Verbs
+
+_TRUNCATE = 128
+_POLL = 0.01
+_DEPTH = 1000
+"""How many messages may come between two looks."""
+
+
+def add(verbs: Verbs) -> None:
+    """Give the verb to its command."""
+    verb = verbs.add('echo', echo, 'Output messages from a topic')
+    add_arguments(verb)
+    add_topic_name(verb, "Name of the ROS topic to listen to (e.g. '/chatter')")
+    verb.add_argument('message_type', nargs='?', help="Type of the message ('std_msgs/msg/String')")
+    qos.add_arguments(verb, 'sensor_data')
+    verb.add_argument('--csv', action='store_true', help='All values separated by commas')
+    verb.add_argument('--field', help="Echo a selected field; '.' for fields of fields")
+    verb.add_argument(
+        '-f', '--full-length', action='store_true', help='All elements of arrays and strings'
+    )
+    verb.add_argument(
+        '-l',
+        '--truncate-length',
+        type=_length,
+        default=_TRUNCATE,
+        help=f'Length to truncate arrays, bytes and strings to (default: {_TRUNCATE})',
+    )
+    verb.add_argument('--no-arr', action='store_true', help="Don't print array fields")
+    verb.add_argument('--no-str', action='store_true', help="Don't print string fields")
+    verb.add_argument('--flow-style', action='store_true', help='Print in the block style or flow')
+    verb.add_argument('--no-lost-messages', action='store_true', help='As ever: none are reported')
+    verb.add_argument('--raw', action='store_true', help='Echo the raw binary representation')
+    verb.add_argument('--filter', metavar='EXPR', help="Only messages for which EXPR of 'm' holds")
+    verb.add_argument('--once', action='store_true', help='Print the first message, then exit')
+    verb.add_argument('--timeout', metavar='N', type=float, help='Exit after N seconds')
+
+
+def echo(arguments: Any) -> None:
+    """Print messages until interrupted, the first one came or time is over."""
+    form = Form(
+        truncate=None if arguments.full_length else arguments.truncate_length,
+        no_arrays=arguments.no_arr,
+        no_strings=arguments.no_str,
+        flow=arguments.flow_style,
+    )
+    wanted = _filter(arguments.filter)
+    topic = absolute(arguments.topic_name)
+    with graph(arguments, lambda own: own.count_publishers(topic)) as own:
+        kind = find_type(arguments.message_type or the_type(own, topic), 'msg')
+        for message, _ in heard(own, topic, kind, arguments):
+            if arguments.raw:
+                print(message, end='\n---\n')
+            else:
+                part = _part(message, arguments.field)
+                if not wanted(part):
+                    continue
+                _print(part, arguments.csv, form)
+            if arguments.once:
+                return
+
+
+def the_type(own: GraphNode, topic: str) -> str:
+    """The type of a topic's messages. Raises :class:`CommandError` when there is not one."""
+    types = topics(own).get(topic)
+    if not types:
+        print(f'WARNING: topic [{topic}] does not appear to be published yet')
+        raise CommandError('Could not determine the type for the passed topic')
+    if len(types) > 1:
+        raise CommandError(
+            f"Cannot echo topic '{topic}', as it contains more than one type: [{', '.join(types)}]"
+        )
+    return types[0]
+
+
+def heard(
+    own: GraphNode, topic: str, kind: type, arguments: Any, *, raw: bool = False
+) -> Iterator[tuple[Any, int]]:
+    """Messages of a topic with their times of reception [ns], None when there is none now."""
+    profile = qos.to_hear(own, topic, arguments)
+    if arguments.qos_depth is None:
+        profile.depth = _DEPTH
+    tap = own.poll(topic, kind, profile, raw=raw or getattr(arguments, 'raw', False))
+    timeout = getattr(arguments, 'timeout', None)
+    end = None if timeout is None else time.monotonic() + timeout
+    while end is None or time.monotonic() < end:
+        yield from tap.take()
+        time.sleep(_POLL)
+
+
+def _print(part: Any, csv: bool, form: Form) -> None:
+    if not hasattr(part, 'get_fields_and_field_types'):
+        print(part, end='\n---\n')
+    elif csv:
+        print(as_csv(part, form))
+    else:
+        print(as_yaml(part, form), end='---\n')
+
+
+def _part(message: Any, field: str | None) -> Any:
+    for name in field.split('.') if field else ():
+        try:
+            message = getattr(message, name)
+        except AttributeError as error:
+            raise CommandError(f"Invalid field '{field}': {error}") from error
+    return message
+
+
+def _filter(expression: str | None) -> Callable[[Any], bool]:
+    if expression is None:
+        return lambda _: True
+    try:
+        code = compile(expression, 'filter', 'eval')
+    except SyntaxError as error:
+        raise CommandError(f'Invalid filter: {error}') from error
+    return lambda message: bool(eval(code, {}, {'m': message}))
+
+
+def _length(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError('value must be non-negative integer')
+    return int(text)

@@ -1,0 +1,102 @@
+"""``ros2 topic pub``: publish messages given as YAML."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from typing import Any
+
+from maglev_ros2cli import qos
+from maglev_ros2cli.errors import CommandError
+from maglev_ros2cli.graph import absolute, add_arguments, add_topic_name, node
+from maglev_ros2cli.interfaces import names
+from maglev_ros2cli.messages import fill, find_type, values_of
+from maglev_ros2cli.parser import Verbs, complete
+
+_SAY_WAITING = 1.0
+
+
+def add(verbs: Verbs) -> None:
+    """Give the verb to its command."""
+    verb = verbs.add('pub', pub, 'Publish a message to a topic')
+    add_arguments(verb)
+    add_topic_name(verb, "Name of the ROS topic to publish to (e.g. '/chatter')")
+    kind = verb.add_argument('message_type', help="Type of the message ('std_msgs/msg/String')")
+    complete(kind, lambda _: names('msg'))
+    verb.add_argument(
+        'values', nargs='?', default='{}', help="Values in YAML ('data: Hello World')"
+    )
+    verb.add_argument('-r', '--rate', metavar='N', type=_rate, default=1.0, help='Rate in Hz')
+    verb.add_argument(
+        '-p', '--print', metavar='N', type=int, default=1, help='Only print every N-th message'
+    )
+    times = verb.add_mutually_exclusive_group()
+    times.add_argument('-1', '--once', action='store_true', help='Publish one message and exit')
+    times.add_argument(
+        '-t', '--times', metavar='N', type=_count, default=0, help='Publish N times and then exit'
+    )
+    verb.add_argument(
+        '-w',
+        '--wait-matching-subscriptions',
+        metavar='N',
+        type=_count,
+        help='Wait for N subscriptions first (default: 1 with --once or --times, otherwise 0)',
+    )
+    verb.add_argument(
+        '--max-wait-time-secs', metavar='S', type=float, help='Wait for them at most S seconds'
+    )
+    verb.add_argument(
+        '--keep-alive', metavar='S', type=float, default=0.1, help='Stay for S seconds at the end'
+    )
+    verb.add_argument('-n', '--node-name', help='Name of the created publishing node')
+    qos.add_arguments(verb, 'default')
+
+
+def pub(arguments: Any) -> None:
+    """Publish until interrupted, or as often as is asked for."""
+    kind = find_type(arguments.message_type, 'msg')
+    message = kind()
+    stampers = fill(message, values_of(arguments.values))
+    times = 1 if arguments.once else arguments.times
+    with node(arguments.node_name) as own:
+        publisher = own.create_publisher(kind, absolute(arguments.topic_name), qos.asked(arguments))
+        wanted = arguments.wait_matching_subscriptions
+        _wait(publisher, min(times, 1) if wanted is None else wanted, arguments.max_wait_time_secs)
+        print('publisher: beginning loop')
+        start, count = time.monotonic(), 0
+        while not times or count < times:
+            time.sleep(max(0.0, start + count / arguments.rate - time.monotonic()))
+            count += 1
+            for stamp in stampers:
+                stamp(own.get_clock().now().to_msg())
+            if arguments.print and count % arguments.print == 0:
+                print(f'publishing #{count}: {message!r}\n')
+            publisher.publish(message)
+        time.sleep(arguments.keep_alive)
+
+
+def _wait(publisher: Any, wanted: int, timeout: float | None) -> None:
+    start = time.monotonic()
+    said = start - _SAY_WAITING
+    while publisher.get_subscription_count() < wanted:
+        now = time.monotonic()
+        if timeout is not None and now - start >= timeout:
+            raise CommandError(f'Timed out waiting for subscribers: Expected {wanted}')
+        if now - said >= _SAY_WAITING:
+            said = now
+            print(f'Waiting for at least {wanted} matching subscription(s)...')
+        time.sleep(0.01)
+
+
+def _rate(text: str) -> float:
+    value = float(text)
+    if not value > 0.0:
+        raise argparse.ArgumentTypeError('value must be positive')
+    return value
+
+
+def _count(text: str) -> int:
+    value = int(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError('value must not be negative')
+    return value

@@ -1,0 +1,260 @@
+"""A node on the graph for as long as a command takes, and what it sees there."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import time
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import rclpy
+from rclpy.signals import SignalHandlerOptions
+from rclpy.topic_or_service_is_hidden import topic_or_service_is_hidden
+
+from maglev_node.dds import prepare_middleware
+from maglev_node.polling import PollingNode
+from maglev_ros2cli.errors import CommandError
+from maglev_ros2cli.parser import Parser, complete
+
+LEAST_WAIT, QUIET, MOST_WAIT = 0.6, 0.3, 3.0
+"""Discovery: its shortest time, how long nothing new must come, its longest time [s]."""
+
+UNSEEN_WAIT = 1.5
+"""How long what is named is looked for [s]."""
+
+SERVICE_PATIENCE = 5.0
+"""How long a service that should be there is waited for [s]."""
+
+RESEND = 2.0
+"""After how long a question is put again: an answer may be lost that comes too early [s]."""
+
+MOST_SLOWNESS = 8.0
+
+_TICK = 0.01
+
+
+class NodeName(NamedTuple):
+    """A node: its name and namespace."""
+
+    name: str
+    namespace: str
+
+    @property
+    def full(self) -> str:
+        """The name with the namespace."""
+        return f'{self.namespace.rstrip("/")}/{self.name}'
+
+    @property
+    def hidden(self) -> bool:
+        """Whether it is none that a user has started."""
+        return self.name.startswith('_')
+
+
+def add_arguments(parser: Parser) -> None:
+    """The options of every command that looks at the graph."""
+    parser.add_argument(
+        '--spin-time',
+        type=float,
+        metavar='SECONDS',
+        help='Time to wait for discovery (default: until nothing new comes)',
+    )
+    parser.add_argument('--no-daemon', action='store_true', help='As ever: this ros2 has no daemon')
+
+
+class GraphNode(PollingNode):
+    """A node that knows how much slower everything goes on a machine that has more to do."""
+
+    slowness = 1.0
+
+
+@contextlib.contextmanager
+def node(name: str | None = None) -> Iterator[GraphNode]:
+    """A node that has discovered nothing yet."""
+    prepare_middleware()
+    clock, used = time.monotonic(), time.process_time()
+    try:
+        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+        own = GraphNode(
+            name or f'_ros2cli_{os.getpid()}',
+            use_global_arguments=False,
+            start_parameter_services=False,
+        )
+    except Exception as error:
+        if not type(error).__module__.startswith(('rclpy', '_rclpy')):
+            raise
+        raise CommandError(str(error).split(', at /')[0]) from error
+    slowness = (time.monotonic() - clock) / max(time.process_time() - used, 1e-3)
+    own.slowness = min(max(slowness, 1.0), MOST_SLOWNESS)
+    try:
+        yield own
+    finally:
+        own.destroy_node()
+        rclpy.try_shutdown()
+
+
+@contextlib.contextmanager
+def graph(
+    arguments: Any, needed: Callable[[GraphNode], object] | None = None
+) -> Iterator[GraphNode]:
+    """A node that has discovered what there is, ``needed`` in particular."""
+    with node() as own:
+        spin_time = getattr(arguments, 'spin_time', None)
+        discover(own, spin_time, None if needed is None else lambda: bool(needed(own)))
+        yield own
+
+
+@contextlib.contextmanager
+def graph_with(arguments: Any) -> Iterator[tuple[GraphNode, str]]:
+    """A node that has discovered the one that is named, and the full name of that.
+
+    Raises :class:`CommandError` where there is none.
+    """
+    full = absolute(arguments.node_name)
+    hidden = getattr(arguments, 'include_hidden_nodes', False)
+
+    def there() -> bool:
+        return full in {each.full for each in nodes(own, hidden=hidden)}
+
+    with node() as own:
+        if not discover(own, arguments.spin_time, there, at_once=True):
+            raise CommandError('Node not found')
+        yield own, full
+
+
+def discover(
+    own: GraphNode,
+    spin_time: float | None = None,
+    needed: Callable[[], bool] | None = None,
+    *,
+    at_once: bool = False,
+) -> bool:
+    """Wait for ``spin_time`` [s], by default until the graph is quiet and what is needed there.
+
+    ``at_once`` ends the wait as soon as that is there. Returns whether it is.
+    """
+    start = changed = time.monotonic()
+    seen: object = None
+    while True:
+        now = time.monotonic()
+        held = needed is None or needed()
+        if held and at_once:
+            return True
+        state = _state(own)
+        if state != seen:
+            seen, changed = state, now
+        passed, quiet = (now - start) / own.slowness, (now - changed) / own.slowness
+        if spin_time is not None:
+            over = now - start >= spin_time
+        elif held:
+            over = passed >= MOST_WAIT or (passed >= LEAST_WAIT and quiet >= QUIET)
+        else:
+            over = passed >= UNSEEN_WAIT
+        if over:
+            return held
+        time.sleep(_TICK)
+
+
+def _state(own: GraphNode) -> object:
+    return (
+        own.get_node_names_and_namespaces(),
+        own.get_topic_names_and_types(),
+        own.get_service_names_and_types(),
+    )
+
+
+def wait_until(condition: Callable[[], bool], timeout: float | None = None) -> bool:
+    """Whether something came to hold within a time [s]; by default that is waited for for ever."""
+    end = None if timeout is None else time.monotonic() + timeout
+    while not condition():
+        if end is not None and time.monotonic() >= end:
+            return False
+        time.sleep(_TICK)
+    return True
+
+
+def nodes(own: GraphNode, *, hidden: bool = False) -> list[NodeName]:
+    """The nodes on the graph, sorted, those of the same name as often as they are there."""
+    found = (NodeName(*pair) for pair in own.get_node_names_and_namespaces())
+    return sorted((each for each in found if hidden or not each.hidden), key=lambda each: each.full)
+
+
+def topics(own: GraphNode, *, hidden: bool = True) -> dict[str, list[str]]:
+    """The topics on the graph with their types, sorted."""
+    return _shown(own.get_topic_names_and_types(), hidden)
+
+
+def services(own: GraphNode, *, hidden: bool = True) -> dict[str, list[str]]:
+    """The services on the graph with their types, sorted."""
+    return _shown(own.get_service_names_and_types(), hidden)
+
+
+def _shown(found: list[tuple[str, list[str]]], hidden: bool) -> dict[str, list[str]]:
+    return {
+        name: types
+        for name, types in sorted(found)
+        if hidden or not topic_or_service_is_hidden(name)
+    }
+
+
+def absolute(name: str) -> str:
+    """The full name of what a command line may name without the leading slash."""
+    return name if name.startswith('/') else f'/{name}'
+
+
+def ask(own: GraphNode, kind: type, service: str, request: Any) -> Any:
+    """The response of a service that may be asked twice.
+
+    Raises :class:`CommandError` where there is no such service.
+    """
+    return answer(own, client(own, kind, service), request, resend=RESEND)
+
+
+def client(own: GraphNode, kind: type, service: str) -> Any:
+    """A client of a service that is ready. Raises :class:`CommandError` where there is none."""
+    made = own.create_client(kind, service)
+    if not wait_until(made.service_is_ready, SERVICE_PATIENCE * own.slowness):
+        raise CommandError(f"Wait for service timed out: '{service}'")
+    return made
+
+
+def answer(own: GraphNode, client: Any, request: Any, *, resend: float = math.inf) -> Any:
+    """The response of a service that is ready, waited for until it comes.
+
+    It may be lost when the service has not seen who asks yet: ``resend`` [s] asks again.
+    """
+    futures: list[Any] = []
+    asked = -math.inf
+    while not any(future.done() for future in futures):
+        if time.monotonic() - asked >= resend or not futures:
+            asked = time.monotonic()
+            futures.append(client.call_async(request))
+        rclpy.spin_until_future_complete(own, futures[-1], timeout_sec=0.1)
+    return next(future.result() for future in futures if future.done())
+
+
+# -- completion ------------------------------------------------------------------------------------
+
+
+def add_node_name(parser: Parser, **options: Any) -> None:
+    """The argument ``node_name``, completed from the graph."""
+    argument = parser.add_argument('node_name', help='Name of the ROS node', **options)
+    complete(argument, lambda given: _seen(given, lambda own: [each.full for each in nodes(own)]))
+
+
+def add_topic_name(parser: Parser, text: str) -> None:
+    """The argument ``topic_name``, completed from the graph."""
+    argument = parser.add_argument('topic_name', help=text)
+    complete(argument, lambda given: _seen(given, lambda own: list(topics(own, hidden=False))))
+
+
+def add_service_name(parser: Parser, text: str) -> None:
+    """The argument ``service_name``, completed from the graph."""
+    argument = parser.add_argument('service_name', help=text)
+    complete(argument, lambda given: _seen(given, lambda own: list(services(own, hidden=False))))
+
+
+def _seen(given: Any, look: Callable[[GraphNode], list[str]]) -> list[str]:
+    with graph(given) as own:
+        return look(own)

@@ -1,0 +1,109 @@
+"""Quality of service from the command line, or from those who publish."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.qos import (
+    DurabilityPolicy,
+    HistoryPolicy,
+    LivelinessPolicy,
+    QoSPresetProfiles,
+    QoSProfile,
+    ReliabilityPolicy,
+)
+
+from maglev_ros2cli.parser import Parser
+
+_POLICIES: dict[str, Any] = {
+    'history': HistoryPolicy,
+    'reliability': ReliabilityPolicy,
+    'durability': DurabilityPolicy,
+    'liveliness': LivelinessPolicy,
+}
+
+
+def add_arguments(parser: Parser, default: str) -> None:
+    """The options ``--qos-*``; ``default`` is the profile that they change."""
+    parser.add_argument(
+        '--qos-profile',
+        choices=[key for key in QoSPresetProfiles.short_keys() if key != 'unknown'],
+        help=f'Quality of service preset profile (default: {default})',
+    )
+    parser.add_argument('--qos-depth', metavar='N', type=int, help='Queue size setting')
+    for name, policy in _POLICIES.items():
+        keys = [key for key in policy.short_keys() if key != 'unknown']
+        parser.add_argument(
+            f'--qos-{name}', choices=keys, help=f'Quality of service {name} setting'
+        )
+    parser.add_argument(
+        '--qos-liveliness-lease-duration-seconds',
+        metavar='SECONDS',
+        type=float,
+        help='Quality of service liveliness lease duration setting',
+    )
+    parser.set_defaults(qos_default=default)
+
+
+def asked(arguments: Any) -> QoSProfile:
+    """The profile that the options ask for."""
+    preset = QoSPresetProfiles.get_from_short_key(arguments.qos_profile or arguments.qos_default)
+    profile = copy.copy(preset)
+    for name, policy in _POLICIES.items():
+        key = getattr(arguments, f'qos_{name}')
+        if key is not None:
+            setattr(profile, name, policy.get_from_short_key(key))
+    if arguments.qos_depth is not None:
+        profile.depth = arguments.qos_depth
+    lease = arguments.qos_liveliness_lease_duration_seconds
+    if lease is not None:
+        profile.liveliness_lease_duration = Duration(seconds=lease)
+    return profile
+
+
+def to_hear(node: Node, topic: str, arguments: Any) -> QoSProfile:
+    """The profile that the options ask for; without any, one that hears every publisher."""
+    profile = asked(arguments)
+    options = [*_POLICIES, 'profile', 'depth', 'liveliness_lease_duration_seconds']
+    if any(getattr(arguments, f'qos_{name}') is not None for name in options):
+        return profile
+    return matching(node, topic, profile)
+
+
+def matching(node: Node, topic: str, profile: QoSProfile) -> QoSProfile:
+    """A profile with the reliability and durability that all publishers of a topic offer.
+
+    Where they differ that is said, and taken what hears them all.
+    """
+    offers = [info.qos_profile for info in node.get_publishers_info_by_topic(topic)]
+    profile = copy.copy(profile)
+    if offers:
+        profile.reliability = _common(
+            [offer.reliability for offer in offers],
+            ReliabilityPolicy.RELIABLE,
+            ReliabilityPolicy.BEST_EFFORT,
+        )
+        profile.durability = _common(
+            [offer.durability for offer in offers],
+            DurabilityPolicy.TRANSIENT_LOCAL,
+            DurabilityPolicy.VOLATILE,
+        )
+    return profile
+
+
+def _common(offered: list[Any], strong: Any, weak: Any) -> Any:
+    if all(policy == strong for policy in offered):
+        return strong
+    if strong in offered:
+        print(
+            f'Some, but not all, publishers are offering {_name(strong)}. Falling back to'
+            f' {_name(weak)} as it will connect to all publishers'
+        )
+    return weak
+
+
+def _name(policy: Any) -> str:
+    return f'{type(policy).__name__}.{policy.name}'

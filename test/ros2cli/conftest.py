@@ -1,0 +1,30 @@
+"""``ros2`` in this process, and a node to look at."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from graph import Process
+from ros2_command import Ros2, ros2_command
+
+NODE = Path(__file__).resolve().parents[1] / 'support' / 'small_stage.py'
+
+
+@pytest.fixture
+def ros2(capsys: pytest.CaptureFixture[str]) -> Ros2:
+    """Carry out a command line, given as words."""
+    return ros2_command(capsys)
+
+
+@pytest.fixture(scope='session')
+def small(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Process]:
+    """The node ``/small``, active."""
+    process = Process([sys.executable, str(NODE)], tmp_path_factory.mktemp('small') / 'log')
+    try:
+        process.wait_for('activate: active')
+        yield process
+    finally:
+        process.kill()
