@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
-from types import SimpleNamespace
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
+from made_up_node import MadeUpNode
 from rosgraph_msgs.msg import Clock
 
 from maglev_model.stage import EncoderSample, Fault, StageError, Truth
 from maglev_msgs.msg import Currents, Measurement, PlantState
 from maglev_node.sampling import Sampling
-from maglev_node.stage_parameters import ClockedStageParameters
-from maglev_node.stamp import nanoseconds, set_stamp
+from maglev_node.stamp import set_stamp
 from maglev_node.topics import MEASUREMENT, TRUE_STATE
 
 ZERO = np.zeros(4)
@@ -87,92 +86,6 @@ class MadeUpStage:
 
     def truth(self) -> Truth | None:
         return self._truth
-
-
-class Topic:
-    """A publisher; messages are noted by what tells them apart."""
-
-    def __init__(self) -> None:
-        self.sequences: list[int] = []
-        self.newest: Any = None
-        self.stamps: list[int] = []
-
-    def publish(self, message: Any) -> None:
-        if isinstance(message, Clock):
-            self.stamps.append(nanoseconds(message.clock))
-            return
-        self.sequences.append(message.sequence)
-        self.stamps.append(nanoseconds(message.header.stamp))
-        self.newest = message
-
-
-class Inbox:
-    """The queue of currents in real time."""
-
-    def __init__(self, stamped: Callable[[Any], Any]) -> None:
-        self.messages: list[Any] = []
-        self._stamped = stamped
-
-    def take(self) -> Iterator[tuple[Any, int]]:
-        waiting, self.messages = self.messages, []
-        return ((self._stamped(message), 0) for message in waiting)
-
-
-class MadeUpNode:
-    """What sampling asks of a node."""
-
-    steady_clock = None
-
-    def __init__(self, **parameters: Any) -> None:
-        self.parameters = ClockedStageParameters(**parameters)
-        self.topics: dict[type, Topic] = {}
-        self.errors: list[str] = []
-        self.failed: list[str] = []
-        self.timers: list[Any] = []
-        self.fail = self.failed.append
-        self.inbox = Inbox(self.stamped)
-        self.subscribers: dict[str, list[str]] = {}
-
-    def get_namespace(self) -> str:
-        return '/'
-
-    def get_subscriptions_info_by_topic(self, topic: str) -> list[Any]:
-        names = self.subscribers.get(topic, [])
-        return [SimpleNamespace(node_name=name, node_namespace='/') for name in names]
-
-    def create_publisher(self, message_type: type, _topic: str, _qos: Any) -> Topic:
-        return self.topics.setdefault(message_type, Topic())
-
-    def create_subscription(self, _type: type, _topic: str, callback: Any, _qos: Any) -> Any:
-        self.answer = lambda message: callback(self.stamped(message))
-        return SimpleNamespace(topic_name='/stage/currents', get_publisher_count=lambda: 0)
-
-    def poll(self, _topic: str, _type: type) -> Inbox:
-        return self.inbox
-
-    def create_timer(self, period: float, action: Any, clock: Any) -> Any:
-        self.tick = action
-        timer = SimpleNamespace(period=period, timer_period_ns=0, reset=lambda: None)
-        self.timers.append(timer)
-        return timer
-
-    def destroy_timer(self, timer: Any) -> None:
-        self.timers.remove(timer)
-
-    def get_logger(self) -> Any:
-        return SimpleNamespace(error=self.errors.append)
-
-    def stamped(self, message: Any) -> Any:
-        """A message with the stamp of its measurement, unless it has one already."""
-        if Measurement in self.topics and not nanoseconds(message.header.stamp):
-            sent = self.topics[Measurement]
-            stamp = dict(zip(sent.sequences, sent.stamps, strict=True)).get(message.sequence, 0)
-            set_stamp(message.header.stamp, stamp)
-        return message
-
-    @property
-    def measured(self) -> list[int]:
-        return self.topics[Measurement].sequences
 
 
 def currents(sequence: int, current: float = 0.0, session: int = 1) -> Currents:
