@@ -10,7 +10,7 @@ from flight import (
     airborne,
     fly,
     gap,
-    hurries,
+    idles,
     landed_without_current,
     samples,
 )
@@ -123,7 +123,7 @@ def test_nothing_hurries_after_the_end_and_a_dead_controller_is_noticed(
     watching.wait(lambda: watching.newest(REFERENCE) is not None)
     watching.wait(lambda: phase(watching) == Reference.END)
     samples(watching, 1100)
-    assert not hurries(watching)
+    assert idles(watching)
     assert watching.call('/reference/lift_off').success
     watching.wait(lambda: airborne(watching), timeout=10.0)
 

@@ -49,12 +49,12 @@ def samples(observer: Observer, count: int) -> None:
     observer.wait(lambda: observer.newest(MEASUREMENT).sequence > end)
 
 
-def hurries(observer: Observer) -> bool:
-    """Whether the loop takes more samples than it must while nothing shall move."""
+def idles(observer: Observer) -> bool:
+    """Whether the loop goes on, and takes no more samples than it must while nothing shall move."""
     first, begun = observer.newest(MEASUREMENT).sequence, time.monotonic()
     observer.serve(2.0)
     rate = (observer.newest(MEASUREMENT).sequence - first) / (time.monotonic() - begun)
-    return not 5.0 < rate < 80.0
+    return 5.0 < rate < 80.0
 
 
 def gap(observer: Observer) -> float:
