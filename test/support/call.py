@@ -1,4 +1,4 @@
-"""``call.py SERVICE[=true|false]...``: calls Triggers and SetBools in turn, a line for each answer."""
+"""``call.py SERVICE[=true|false]...``: calls Triggers and SetBools in turn; a line an answer."""
 
 from __future__ import annotations
 
