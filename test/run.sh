@@ -8,19 +8,20 @@ root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd -P)
 cd "$root"
 MAGLEV_SETUP=test . "$root/setup.sh"
 
-# Two domains nobody else on this machine tests in, the second for a second worker: held by a lock
-# on a file as long as this shell lives.
+# Domains nobody else on this machine tests in, one for each worker: held by a lock on a file as long
+# as this shell lives.
 take_domain() {
   local locks=${XDG_RUNTIME_DIR:-/tmp}/maglev-domains-$UID number
   mkdir -p -- "$locks"
-  for number in $(shuf -i 1-50); do
+  for number in $(shuf -i 1-33); do
     exec 8>"$locks/$number"
     if flock -n 8; then
-      export ROS_DOMAIN_ID=$number MAGLEV_TEST_DOMAINS="$number $((number + 50))"
+      export ROS_DOMAIN_ID=$number
+      export MAGLEV_TEST_DOMAINS="$number $((number + 33)) $((number + 66))"
       return
     fi
   done
-  echo 'test: all ROS domains 1 to 100 are taken by other test runs' >&2
+  echo 'test: all ROS domains 1 to 99 are taken by other test runs' >&2
   exit 1
 }
 
@@ -116,13 +117,10 @@ code=0
 if (($#)); then
   run_pytest "$@" || code=$?
 else
-  # Mathematics, libraries and stand-ins side by side; then real nodes, two flights at a time; then,
-  # with the machine to themselves, those that fly in real time.
-  flights=(test/scenario/test_scenarios.py test/graph) # the long ones first
-  run_pytest -p xdist -n logical --maxprocesses 4 --dist loadfile test "${flights[@]/#/--ignore=}" ||
-    code=$?
-  run_pytest -p xdist -n 2 -m 'not alone' "${flights[@]}" || code=$?
-  run_pytest -m alone "${flights[@]}" || code=$?
+  # Three files at a time, for those with real nodes wait often, and a flight in lockstep bears what
+  # the others take; then, with the machine to themselves, those that fly in real time.
+  run_pytest -p xdist -n 3 --dist loadfile --no-loadscope-reorder -m 'not alone' || code=$?
+  run_pytest -m alone test/graph test/scenario || code=$?
 fi
 style=passed
 wait "$style_job" || style=failed

@@ -13,13 +13,16 @@ from flight import (
     airborne,
     fly,
     gap,
+    idles,
     impact_speed,
     landed_without_current,
+    samples,
+    starts,
 )
-from graph import Nodes, Observer
+from graph import Nodes, Observer, Process
 
 from maglev_msgs.msg import ControllerState, Reference
-from maglev_node.topics import CONTROLLER_STATE, CURRENTS, MEASUREMENT, REFERENCE, TRUE_STATE
+from maglev_node.topics import CONTROLLER_STATE, MEASUREMENT, REFERENCE
 
 
 def errors_on_time(observer: Observer, first: int) -> np.ndarray:
@@ -51,11 +54,21 @@ def test_lift_off_ellipse_landing(nodes: Nodes, watching: Observer) -> None:
     modes = [message.mode for message in watching.messages[CONTROLLER_STATE]]
     assert ControllerState.FAULT not in modes
     assert ControllerState.LANDING not in modes
+    samples(watching, 10)
+    assert idles(watching)  # with the reference gone
 
 
-def test_without_its_reference_the_controller_lands(nodes: Nodes, watching: Observer) -> None:
-    graph = fly(nodes, LONG)
+def test_a_controller_is_waited_for_and_lands_without_its_reference(
+    nodes: Nodes, watching: Observer
+) -> None:
+    plant, controller, reference = starts(nodes, LONG, watched=())
+    graph = {'plant': plant(), 'reference': reference()}
+    graph['reference'].wait_for('starting at sample 0')
+    watching.serve(0.5)
+    assert {message.phase for message in watching.look()[REFERENCE]} == {Reference.REST}
+    graph['controller'] = controller()
     watching.wait(lambda: airborne(watching))
+
     graph['reference'].kill()
     watching.wait(lambda: landed_without_current(watching))
     assert impact_speed(watching) < 0.05
@@ -65,20 +78,18 @@ def test_without_its_reference_the_controller_lands(nodes: Nodes, watching: Obse
     assert answer.success
 
 
-def test_a_controller_told_to_end_lands_first(nodes: Nodes, watching: Observer) -> None:
+def test_all_that_a_flight_bears(nodes: Nodes, watching: Observer) -> None:
+    """Second nodes, new parameters, a landing and another lift-off, the controller's end."""
     graph = fly(nodes, LONG)
     watching.wait(lambda: airborne(watching))
-    graph['controller'].signal(signal.SIGTERM)
-    watching.wait(lambda: not graph['controller'].running)
-    assert graph['controller'].wait() == 0
-    assert watching.newest(CONTROLLER_STATE).mode == ControllerState.DISABLED
-    assert impact_speed(watching) < 0.05
-    assert gap(watching) == pytest.approx(LOWER_STOP, abs=1e-5)
+    for name in graph:
+        second = nodes.start(name)
+        assert second.wait() == 1
+        assert 'there is another' in second.output
+        assert all(process.running for process in graph.values())
 
+    retune(graph, watching, bound=50e-6)
 
-def test_disabled_it_lands_enabled_it_flies_again(nodes: Nodes, watching: Observer) -> None:
-    graph = fly(nodes, LONG)
-    watching.wait(lambda: airborne(watching))
     assert watching.call('/controller/enable', False).success
     watching.wait(lambda: landed_without_current(watching))
     assert impact_speed(watching) < 0.05
@@ -89,36 +100,12 @@ def test_disabled_it_lands_enabled_it_flies_again(nodes: Nodes, watching: Observ
     watching.wait(lambda: airborne(watching))
     assert watching.newest(CONTROLLER_STATE).mode == ControllerState.REGULATING
 
-
-def test_without_its_controller_the_plant_says_so(nodes: Nodes, watching: Observer) -> None:
-    graph = fly(nodes, LONG, 'timeout:=3.0', answer_timeout=2.0)
-    watching.wait(lambda: airborne(watching))
-    graph['controller'].kill()
-    assert graph['plant'].wait() == 1
-    assert 'no currents for sample' in graph['plant'].output
-    assert graph['reference'].wait() == 1
-    assert 'no measurement for' in graph['reference'].output
-
-
-def test_emergency_stop_is_latched(nodes: Nodes, watching: Observer) -> None:
-    graph = fly(nodes, LONG)
-    watching.wait(lambda: airborne(watching))
-    assert watching.call('/plant/emergency_stop').success
-    graph['plant'].wait_for('currents cut')
-    watching.wait(lambda: not np.any(watching.newest(TRUE_STATE).direct_current))
-    assert watching.call('/plant/reset').success
-    assert not watching.call('/plant/reset').success
-
-
-def test_emergency_stop_of_the_controller(nodes: Nodes, watching: Observer) -> None:
-    fly(nodes, LONG)
-    watching.wait(lambda: airborne(watching))
-    assert watching.call('/controller/emergency_stop').success
-    watching.wait(lambda: watching.newest(CONTROLLER_STATE).mode == ControllerState.FAULT)
-    assert not np.any(watching.newest(CURRENTS).direct_current)
-    assert not watching.call('/controller/enable', True).success
-    assert watching.call('/controller/reset').success
-    assert watching.call('/controller/enable', True).success
+    graph['controller'].signal(signal.SIGTERM)
+    watching.wait(lambda: not graph['controller'].running)
+    assert graph['controller'].wait() == 0
+    assert watching.newest(CONTROLLER_STATE).mode == ControllerState.DISABLED
+    assert impact_speed(watching) < 0.05
+    assert gap(watching) == pytest.approx(LOWER_STOP, abs=1e-5)
 
 
 @pytest.mark.alone
@@ -147,12 +134,8 @@ def test_real_time_also_when_a_process_was_stopped(nodes: Nodes, watching: Obser
         assert 'currents cut' not in graph['plant'].output
 
 
-@pytest.mark.parametrize('mode', ['lockstep', pytest.param('realtime', marks=pytest.mark.alone)])
-def test_retuning_in_flight_is_checked_and_bumpless(
-    nodes: Nodes, watching: Observer, mode: str
-) -> None:
-    graph = fly(nodes, LONG, mode=mode)
-    watching.wait(lambda: watching.newest(REFERENCE) is not None)
+def retune(graph: dict[str, Process], watching: Observer, bound: float) -> None:
+    """Change parameters in flight: checked, and felt by no more than an error of ``bound`` [m]."""
     watching.wait(lambda: watching.newest(REFERENCE).phase == Reference.TRACK)
     for refused, said in (
         ({'x__bandwidth': 1e30}, 'bandwidth'),
@@ -172,20 +155,15 @@ def test_retuning_in_flight_is_checked_and_bumpless(
         if message.sequence > after - 3000 and message.mode == ControllerState.REGULATING
     ]
     assert tracking[-1].sequence > after - 5, graph['controller'].output
-    # In real time the parameter service itself holds the loop up for some samples.
-    bound = {'lockstep': 50e-6, 'realtime': 500e-6}[mode]
     assert np.max(np.abs([message.error[:3] for message in tracking])) < bound
     assert 'currents cut' not in graph['plant'].output
 
 
-def test_a_second_one_is_refused(nodes: Nodes, watching: Observer) -> None:
-    graph = fly(nodes, LONG)
-    watching.wait(lambda: airborne(watching))
-    for name in graph:
-        second = nodes.start(name)
-        assert second.wait() == 1
-        assert 'there is another' in second.output
-        assert all(process.running for process in graph.values())
+@pytest.mark.alone
+def test_retuning_in_real_time(nodes: Nodes, watching: Observer) -> None:
+    graph = fly(nodes, LONG, mode='realtime')
+    watching.wait(lambda: watching.newest(REFERENCE) is not None)
+    retune(graph, watching, bound=500e-6)  # the service itself holds the loop up for some samples
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import signal
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,10 +19,18 @@ from two_hosts import TwoHosts, why_not
 from maglev_monitor.bag.compare import compare
 from maglev_monitor.bag.reader import Bag
 
+PATIENCE = 90.0  # for processes of lower priority than those that fly in real time [s]
 CALL = Path(__file__).resolve().parents[1] / 'support' / 'call.py'
+WAY_BACK = (
+    '/reference/lift_off',  # is refused
+    '/controller/reset',  # where it is in a fault and has not landed by itself
+    '/controller/enable=true',
+    '/hw_bridge/reset',
+    '/reference/lift_off',
+)
 REFERENCE = (
-    *('run_in:=0.2', 'move_time:=0.5', 'lift_off.time:=0.6', 'lift_off.settle:=0.1'),
-    *('landing.time:=0.6', 'landing.crawl_distance:=1.0e-4'),
+    *('run_in:=0.0', 'move_time:=0.4', 'lift_off.time:=0.5', 'lift_off.settle:=0.0'),
+    *('landing.time:=0.5', 'landing.crawl_distance:=1.0e-4'),
 )
 
 
@@ -49,7 +56,7 @@ def fly(nodes: Nodes, bag: Path, *on: list[str]) -> dict[str, Any]:
     monitor = nodes.start('monitor', f'output:={metrics}', on=near)
     nodes.start('plant', watched, params=('benchmark.yaml',), on=near)
     nodes.start('controller', watched, on=far)
-    options = (watched, 'duration:=1.0', 'exit_at_end:=true', *REFERENCE)
+    options = (watched, 'duration:=0.5', 'exit_at_end:=true', *REFERENCE)
     reference = nodes.start('reference', *options, params=('scenario_ellipse.yaml',), on=far)
     assert reference.wait(90) == 0, reference.output
     monitor.wait()
@@ -70,12 +77,12 @@ def test_in_lockstep_a_bad_cable_changes_nothing(
     figures = fly(nodes, bags[1], hosts.on(0), hosts.on(1))
     assert hosts.close() > 20
     assert figures['missing_samples'] == 0
-    assert figures['samples'] == 1000
+    assert figures['samples'] == 500
     found = compare((Bag(bags[0]), Bag(bags[1])))
     assert len(found) == 5
     for topic in found.values():
         assert topic.equal, topic
-        assert topic.both > 3000
+        assert topic.both > 2000
 
 
 def sample(process: Process, words: str) -> int:
@@ -91,10 +98,6 @@ def test_in_real_time_a_cut_cable_lands_and_only_resets_fly_again(
 ) -> None:
     stage, law = hosts.on(0), hosts.on(1)
 
-    def call(*arguments: str) -> bool:
-        command = [*law, sys.executable, str(CALL), *arguments]
-        return subprocess.run(command, timeout=30, check=False).returncode == 0
-
     def reference(*arguments: str) -> Process:
         return nodes.start(
             *('reference', 'mode:=realtime', 'duration:=600.0', *REFERENCE, *arguments),
@@ -108,23 +111,21 @@ def test_in_real_time_a_cut_cable_lands_and_only_resets_fly_again(
         params=('hw_bridge.yaml',),
         on=stage,
     )
-    controller = nodes.start('controller', 'mode:=realtime', on=law)
+    nodes.start('controller', 'mode:=realtime', on=law)
     first = reference()
-    first.wait_for('TRACK at sample')
+    first.wait_for('TRACK at sample', PATIENCE)
     hosts.cut()
     fault = sample(bridge, 'fault at sample')
     assert first.wait() == 1
     hosts.lose(0.0, 0.0)
-    controller.wait_for('measurements are missing')
     second = reference('autostart:=false')
-    second.wait_for('resting until')
-    assert not call('/reference/lift_off')
-    assert call('/controller/reset')
-    assert call('/controller/enable', 'true')
-    assert call('/hw_bridge/reset')
-    assert call('/reference/lift_off')
+    second.wait_for('resting until', PATIENCE)
+    calls = nodes.run('call', [*law, sys.executable, str(CALL), *WAY_BACK])
+    calls.wait(PATIENCE)
+    answers = [line.split()[0] for line in calls.output.splitlines()]
+    assert answers[:1] + answers[2:] == ['no', 'yes', 'yes', 'yes'], calls.output
     again = sample(second, 'LIFT_OFF at sample')
-    second.wait_for('TRACK at sample')
+    second.wait_for('TRACK at sample', PATIENCE)
     recorder.signal(signal.SIGINT)
     assert recorder.wait() == 0
 

@@ -1,4 +1,4 @@
-"""``call.py SERVICE [true|false]``: calls a Trigger, or a SetBool; 0 when it succeeds."""
+"""``call.py SERVICE[=true|false]...``: calls Triggers and SetBools in turn; a line an answer."""
 
 from __future__ import annotations
 
@@ -7,14 +7,15 @@ import sys
 from graph import Observer
 
 
-def main(service: str, data: str = '') -> int:
-    """Call it and print its message."""
+def main(calls: list[str]) -> None:
+    """Print ``yes`` or ``no`` and the message of each answer."""
     observer = Observer()
-    answer = observer.call(service, data == 'true' if data else None)
-    print(answer.message)
+    for call in calls:
+        service, equals, data = call.partition('=')
+        answer = observer.call(service, data == 'true' if equals else None)
+        print('yes' if answer.success else 'no', answer.message, flush=True)
     observer.close()
-    return 0 if answer.success else 1
 
 
 if __name__ == '__main__':
-    sys.exit(main(*sys.argv[1:]))
+    main(sys.argv[1:])

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
 import numpy as np
 from graph import Nodes, Observer, Process
 
-from maglev_node.topics import CURRENTS, TRUE_STATE
+from maglev_node.topics import CURRENTS, MEASUREMENT, TRUE_STATE
 
 ELLIPSE = 'scenario_ellipse.yaml'
 LONG = 'duration:=600.0'
@@ -13,25 +18,43 @@ WATCHED = 'watchers:=[observer]'  # by the test
 LOWER_STOP = 0.031
 
 
-def fly(
+def starts(
     nodes: Nodes,
     *arguments: str,
     mode: str = 'lockstep',
     answer_timeout: float = 5.0,
     plant: tuple[str, ...] = (),
     controller: tuple[str, ...] = (),
-) -> dict[str, Process]:
-    """Start plant, controller and reference on the ellipse; ``arguments`` are the reference's."""
+    watched: tuple[str, ...] = (WATCHED,),
+) -> tuple[Callable[[], Process], ...]:
+    """What starts plant, controller and reference on the ellipse; ``arguments`` are the last's."""
+    common = f'mode:={mode}', *watched
     patience = f'answer_timeout:={answer_timeout}'
-    return {
-        'plant': nodes.start(
-            'plant', f'mode:={mode}', WATCHED, patience, *plant, params=('benchmark.yaml',)
-        ),
-        'controller': nodes.start('controller', f'mode:={mode}', WATCHED, *controller),
-        'reference': nodes.start(
-            'reference', f'mode:={mode}', WATCHED, 'run_in:=1.0', *arguments, params=(ELLIPSE,)
-        ),
-    }
+    return (
+        partial(nodes.start, 'plant', *common, patience, *plant, params=('benchmark.yaml',)),
+        partial(nodes.start, 'controller', *common, *controller),
+        partial(nodes.start, 'reference', *common, 'run_in:=1.0', *arguments, params=(ELLIPSE,)),
+    )
+
+
+def fly(nodes: Nodes, *arguments: str, **options: Any) -> dict[str, Process]:
+    """Start them, as :func:`starts` says."""
+    plant, controller, reference = starts(nodes, *arguments, **options)
+    return {'plant': plant(), 'controller': controller(), 'reference': reference()}
+
+
+def samples(observer: Observer, count: int) -> None:
+    """Wait until the stage has taken so many more."""
+    end = observer.newest(MEASUREMENT).sequence + count
+    observer.wait(lambda: observer.newest(MEASUREMENT).sequence > end)
+
+
+def idles(observer: Observer) -> bool:
+    """Whether the loop goes on, and takes no more samples than it must while nothing shall move."""
+    first, begun = observer.newest(MEASUREMENT).sequence, time.monotonic()
+    observer.serve(2.0)
+    rate = (observer.newest(MEASUREMENT).sequence - first) / (time.monotonic() - begun)
+    return 5.0 < rate < 80.0
 
 
 def gap(observer: Observer) -> float:

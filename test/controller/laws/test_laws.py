@@ -46,16 +46,21 @@ def design(file: str, axis: str, **overrides: object) -> AxisDesign:
     return control_law(chosen).design(chosen, axis)
 
 
-def loop(found: AxisDesign, stiff: float, delay: int = 0) -> control.StateSpace:
-    """The open loop from e to -e by python-control, plant ``1 / (s² - α)`` held."""
-    n = found.drive.size
-    compensator = control.ss(
+def sampled(found: AxisDesign) -> control.StateSpace:
+    """Its compensator by python-control."""
+    return control.ss(
         found.transition,
         found.drive[:, None],
         -found.gain[None, 2:],
         [[-found.gain[0]]],
         PERIOD,
     )
+
+
+def loop(found: AxisDesign, stiff: float, delay: int = 0) -> control.StateSpace:
+    """The open loop from e to -e by python-control, plant ``1 / (s² - α)`` held."""
+    n = found.drive.size
+    compensator = sampled(found)
     assert compensator.nstates == n
     continuous = control.ss([[0.0, 1.0], [stiff, 0.0]], [[0.0], [1.0]], [[1.0, 0.0]], [[0.0]])
     plant = control.sample_system(continuous, PERIOD, method='zoh')
@@ -134,14 +139,7 @@ def test_the_shapes_are_what_they_are_called() -> None:
         values = np.linalg.eigvals(found.transition)
         assert values.size == poles
         assert np.min(np.abs(values - 1.0)) < 1e-12
-        compensator = control.ss(
-            found.transition,
-            found.drive[:, None],
-            -found.gain[None, 2:],
-            [[-found.gain[0]]],
-            PERIOD,
-        )
-        zeros = control.ss2tf(compensator).zeros()
+        zeros = control.ss2tf(sampled(found)).zeros()
         slow = zeros[np.argmin(np.abs(zeros - 1.0))].real
         corner = 2.0 / PERIOD * (1.0 - slow) / (1.0 + slow)
         assert corner == pytest.approx(30.0, rel=1e-6)

@@ -1,0 +1,163 @@
+"""What a user may ask of a scenario, and what the nodes are told then. They are stand-ins."""
+
+from __future__ import annotations
+
+import pytest
+from stand_ins import NODES, ROOT, Tree
+
+from runner import overlays
+
+WATCHERS = "watchers:=['monitor','recorder']"
+
+
+def test_the_nodes_get_their_parameters(tree: Tree) -> None:
+    tree.parameters('mine.yaml', 'controller')
+    tree.parameters('params/machine.yaml')
+    options = ('--mode', 'realtime', '--duration=3', '--params', 'soft', '--params', 'mine.yaml')
+    code, output = tree.run(*options)
+    assert code == 0, output
+    over = ['params/scenario_ellipse.yaml', 'params/soft.yaml', 'mine.yaml']
+    assert tree.files('plant') == ['params/machine.yaml', 'params/plant.yaml', *over]
+    for node in NODES:
+        assert tree.files(node)[0] == 'params/machine.yaml'
+        assert tree.files(node)[-3:] == over
+        assert f'effective_parameters:={tree.out}/params/{node}.yaml' in tree.arguments(node)
+    assert {'mode:=realtime', WATCHERS} <= set(tree.arguments('plant'))
+    reference = tree.arguments('reference')
+    assert {'duration:=3.0', 'autostart:=true', WATCHERS, 'lead:=128'} <= set(reference)
+    monitor = tree.arguments('monitor')
+    assert {f'output:={tree.out}/metrics.json', 'scenario:=ellipse', 'stage:=plant'} <= set(monitor)
+    assert f'output:={tree.out}/bag' in tree.arguments('recorder')
+
+
+def test_without_a_machine_file_each_node_starts_with_its_own(tree: Tree) -> None:
+    assert tree.run()[0] == 0
+    assert tree.files('plant') == ['params/plant.yaml', 'params/scenario_ellipse.yaml']
+    assert tree.files('controller') == ['params/scenario_ellipse.yaml']
+    assert not [word for word in tree.arguments('reference') if 'duration' in word]
+
+
+@pytest.mark.parametrize(
+    ('options', 'words'),
+    [
+        (['--speed', '3'], "unknown option '--speed'"),
+        (['ellipse'], "unknown option 'ellipse'"),
+        (['--mode', 'fast'], "--mode is 'fast', it must be one of: lockstep realtime"),
+        (['--stage=model'], "--stage is 'model', it must be one of: plant hw_bridge"),
+        (['--duration', 'long'], "--duration is 'long', it must be a number of seconds above 0"),
+        (['--duration', '-1'], "--duration is '-1'"),
+        (['--duration', '0'], "--duration is '0'"),
+        (['--duration'], '--duration needs a value'),
+        (['--out='], '--out needs a folder'),
+        (['--params', 'none.yaml'], "there is no file 'none.yaml'"),
+        (['--params', 'typo.yaml'], "parameters for 'contoller', which is no node"),
+        (['--params', 'twice.yaml'], "'speed' is given twice"),
+        (['--params', 'other.yaml', '--namespace', 'b'], "parameters for '/a/plant', which is no"),
+        (['--namespace', ''], "--namespace is ''"),
+        (['--namespace', '/'], "--namespace is '/'"),
+        (['--namespace', '1st'], "--namespace is '1st', it must be names of letters"),
+        (['--namespace', 'a/'], "--namespace is 'a/'"),
+        (['--namespace', 'a//b'], "--namespace is 'a//b'"),
+        (['--namespace', 'a__b'], "--namespace is 'a__b'"),
+        (['--namespace', 'a-b'], "--namespace is 'a-b'"),
+        (['--params', 'flat.yaml'], "section 'controller' must hold 'ros__parameters'"),
+    ],
+)
+def test_options_that_make_no_sense(tree: Tree, options: list[str], words: str) -> None:
+    (tree.path / 'typo.yaml').write_text('# why\n\ncontoller:\n  ros__parameters:\n    a: 1\n')
+    (tree.path / 'twice.yaml').write_text('plant:\n  ros__parameters: {speed: 1, speed: 2}\n')
+    (tree.path / 'other.yaml').write_text('/a/plant:\n  ros__parameters: {speed: 1}\n')
+    (tree.path / 'flat.yaml').write_text('controller:\n  speed: 1\n')
+    code, output = tree.run(*options)
+    assert code == 2
+    assert words in output
+    assert output.startswith('ellipse: error: ')
+    assert len(output.splitlines()) == 1
+    assert tree.started() == []
+    assert not tree.out.exists()
+
+
+def test_help_starts_nothing(tree: Tree) -> None:
+    (tree.path / 'setup.sh').write_text('exit 70\n')
+    code, output = tree.run('--help')
+    assert code == 0
+    for option in ('--stage', '--mode', '--duration', '--params', '--namespace', '--out'):
+        assert option in output
+
+
+def test_what_is_wrong_is_said_before_the_set_up_where_there_is_a_python(tree: Tree) -> None:
+    (tree.path / 'setup.sh').write_text('echo set-up\nexit 70\n')
+    code, output = tree.run('--mode', 'fast')
+    assert code == 2
+    assert "--mode is 'fast'" in output
+    assert tree.run() == (70, 'set-up\n')
+    tree.script(tree.path / 'bin' / 'python3', '#!/usr/bin/env bash\nexit 1\n')
+    assert tree.run('--mode', 'fast') == (70, 'set-up\n')
+
+
+def test_a_trajectory_is_chosen_by_name_or_file(tree: Tree) -> None:
+    tree.parameters('params/scenario_file.yaml')
+    code, output = tree.finish('ellipse', '--out', str(tree.out), script='trajectory')
+    assert code == 0, output
+    assert 'file.path' not in ' '.join(tree.arguments('reference'))
+    path = tree.path / "a path's.csv"
+    path.write_text('t,y,x,z,phi,theta\n')
+    second = str(tree.path / 'second')
+    code, output = tree.finish(path.name, '--out', second, '--duration', '3', script='trajectory')
+    assert code == 0, output
+    arguments = tree.arguments('reference')
+    assert f"file.path:='{tree.path}/a path''s.csv'" in arguments
+    assert 'duration:=3.0' in arguments
+    assert 'params/scenario_file.yaml' in tree.files('reference')
+
+
+@pytest.mark.parametrize(
+    ('options', 'code', 'words'),
+    [
+        (['elipse'], 2, "the trajectory is 'elipse', it must be one of: ellipse"),
+        (['none.csv'], 2, "cannot read 'none.csv'"),
+        (['--out', 'x'], 2, "the trajectory is '--out'"),
+        ([], 0, 'usage: scenarios/trajectory.sh NAME|FILE.csv'),
+        (['ellipse', '--help'], 0, 'usage: scenarios/trajectory.sh NAME|FILE.csv'),
+        (['ellipse', '--mode', 'fast'], 2, 'must be one of: lockstep realtime'),
+    ],
+)
+def test_a_trajectory_that_makes_no_sense(
+    tree: Tree, options: list[str], code: int, words: str
+) -> None:
+    found, output = tree.finish(*options, script='trajectory')
+    assert found == code, output
+    assert words in output
+    assert not tree.started()
+
+
+def test_the_shipped_overlays_are_taken() -> None:
+    others = ROOT / 'params' / 'rosbag2_qos.yaml'  # is for rosbag2
+    for path in sorted({*(ROOT / 'params').rglob('*.yaml')} - {others}):
+        name = str(path.relative_to(ROOT / 'params').with_suffix(''))
+        assert overlays.overlay('--params', name) == str(path)
+        overlays.check_overlay(str(path))
+
+
+@pytest.mark.parametrize(('given', 'full'), [('stage1', '/stage1'), ('/lab/b_2', '/lab/b_2')])
+def test_all_nodes_are_in_the_namespace(tree: Tree, given: str, full: str) -> None:
+    tree.parameters('mine.yaml', f'{full}/controller')
+    code, output = tree.run('--namespace', given, '--params', 'mine.yaml')
+    assert code == 0, output
+    assert f'ellipse: plant, lockstep in {full}, into {tree.out}' in output
+    for node in NODES:
+        words = tree.arguments(node)
+        assert words[words.index('-r') + 1] == f'__ns:={full}'
+        assert tree.files(node)[-1] == 'mine.yaml'
+
+
+def test_without_a_namespace_none_is_set(tree: Tree) -> None:
+    assert tree.run()[0] == 0
+    assert '-r' not in tree.arguments('plant')
+
+
+def test_runs_in_namespaces_are_left_apart(tree: Tree) -> None:
+    code, output = tree.finish('--namespace', 'lab/b', script='ellipse')
+    assert code == 0, output
+    (folder,) = (tree.path / 'runs').iterdir()
+    assert folder.name.startswith('ellipse-lab-b-')
