@@ -192,6 +192,7 @@ END
     first PYTHONPATH "$cache/test-tools"
     echo 'fi'
     [[ $branch == native ]] || small_ros2
+    printf '. %q\n' "$root/scenarios/complete.bash"
     default ROS_AUTOMATIC_DISCOVERY_RANGE LOCALHOST
     default OPENBLAS_NUM_THREADS 1
     default OMP_NUM_THREADS 1

@@ -14,9 +14,9 @@ NODE = Path(__file__).resolve().parents[1] / 'support' / 'small_stage.py'
 
 
 @pytest.fixture
-def ros2(capsys: pytest.CaptureFixture[str]) -> Ros2:
+def ros2(capfd: pytest.CaptureFixture[str]) -> Ros2:
     """Carry out a command line, given as words."""
-    return ros2_command(capsys)
+    return ros2_command(capfd)
 
 
 @pytest.fixture(scope='session')

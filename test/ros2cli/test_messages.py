@@ -9,8 +9,15 @@ import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from geometry_msgs.msg import PoseArray, PoseStamped
-from std_msgs.msg import Bool, Float64, Header, String, UInt8
+from std_msgs.msg import (
+    Bool,
+    Float64,
+    Header,
+    MultiArrayDimension,
+    MultiArrayLayout,
+    String,
+    UInt8,
+)
 from std_srvs.srv import Trigger
 
 from maglev_msgs.msg import Measurement
@@ -100,16 +107,16 @@ def test_fill_messages_within_messages() -> None:
     fill(array, values_of('status: [{level: 2, name: a, values: [{key: k, value: 5}]}, {}]'))
     first = DiagnosticStatus(level=b'\x02', name='a', values=[KeyValue(key='k', value='5')])
     assert array.status == [first, DiagnosticStatus()]
-    poses = PoseArray()
-    fill(poses, values_of('poses: [{position: {x: 1}}]'))
-    assert poses.poses[0].position.x == 1.0
+    layout = MultiArrayLayout()
+    fill(layout, values_of('dim: [{label: x, size: 2}]'))
+    assert layout.dim == [MultiArrayDimension(label='x', size=2)]
 
 
 def test_fill_with_the_time_of_publication() -> None:
-    pose = PoseStamped()
-    (stamp,) = fill(pose, values_of('{header: auto, pose: {position: {z: 1.5}}}'))
+    message = Measurement()
+    (stamp,) = fill(message, values_of('{header: auto, z: 1.5}'))
     stamp(Time(sec=7))
-    assert (pose.header.stamp.sec, pose.pose.position.z) == (7, 1.5)
+    assert (message.header.stamp.sec, message.z) == (7, 1.5)
     header = Header()
     (stamp,) = fill(header, values_of('stamp: now'))
     stamp(Time(sec=8))

@@ -266,3 +266,33 @@ def test_once_done_it_costs_nothing_and_changes_no_shell(tmp_path: Path) -> None
         ['/bin/bash', '-c', script], env=environment, capture_output=True, text=True, check=False
     )
     assert (result.returncode, result.stdout, result.stderr) == (0, '', '')
+
+
+@needs_wheels
+def test_ros2_is_there_and_never_before_a_real_one(tmp_path: Path) -> None:
+    if not (ROOT / 'install' / '.stamp').exists():
+        pytest.skip('this workspace was not set up by setup.sh')
+    real = tmp_path / 'ros2'
+    real.write_text('#!/bin/sh\n')
+    real.chmod(0o755)
+    script = f"""
+        set -eu
+        . {ROOT}/setup.sh
+        type -P ros2
+        complete -p ros2
+        PATH=$PATH:{tmp_path}
+        . {ROOT}/setup.sh
+        type -P ros2
+    """
+    result = subprocess.run(
+        ['/bin/bash', '-c', script],
+        env={'HOME': os.environ['HOME'], 'PATH': os.defpath},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (result.returncode, result.stderr) == (0, '')
+    ours, completion, found = result.stdout.splitlines()
+    assert ours == f'{ROOT}/install/maglev_ros2cli/lib/maglev_ros2cli/ros2'
+    assert completion.endswith(' ros2')
+    assert found == str(real)

@@ -26,7 +26,7 @@ Ros2 = Callable[..., Answer]
 """Carries out a command line that is given as words."""
 
 
-def ros2_command(capsys: pytest.CaptureFixture[str]) -> Ros2:
+def ros2_command(capfd: pytest.CaptureFixture[str]) -> Ros2:
     """The command, with what it prints."""
 
     def carry_out(*words: str) -> Answer:
@@ -35,6 +35,6 @@ def ros2_command(capsys: pytest.CaptureFixture[str]) -> Ros2:
             code = run(words)
         except SystemExit as end:
             code = end.code
-        return Answer(code, *capsys.readouterr())
+        return Answer(code, *capfd.readouterr())
 
     return carry_out

@@ -13,16 +13,17 @@ import rclpy
 from rclpy.signals import SignalHandlerOptions
 from rclpy.topic_or_service_is_hidden import topic_or_service_is_hidden
 
-from maglev_node.dds import prepare_middleware
+from maglev_node.dds import local_participants, prepare_middleware
 from maglev_node.polling import PollingNode
 from maglev_ros2cli.errors import CommandError
 from maglev_ros2cli.parser import Parser, complete
 
-LEAST_WAIT, QUIET, MOST_WAIT = 0.6, 0.3, 3.0
-"""Discovery: its shortest time, how long nothing new must come, its longest time [s]."""
+QUIET = 0.15
+"""Discovery ends when every participant of this machine is seen and nothing new comes so long [s].
+"""
 
-UNSEEN_WAIT = 1.5
-"""How long what is named is looked for [s]."""
+ABROAD_WAIT, MOST_WAIT = 1.0, 5.0
+"""It takes at least so long where other machines may take part, and at most so long [s]."""
 
 SERVICE_PATIENCE = 5.0
 """How long a service that should be there is waited for [s]."""
@@ -30,9 +31,13 @@ SERVICE_PATIENCE = 5.0
 RESEND = 2.0
 """After how long a question is put again: an answer may be lost that comes too early [s]."""
 
-MOST_SLOWNESS = 8.0
+_EVERYWHERE = ('/parameter_events', '/rosout')
+"""Topics to which every node publishes."""
+_UNKNOWN = '_NODE_NAME_UNKNOWN_'
+"""What rmw calls the node of an endpoint until its participant has told its nodes."""
 
 _TICK = 0.01
+_PREFIX = 12  # bytes of a GUID that are its participant's (DDSI-RTPS 8.2.4.1)
 
 
 class NodeName(NamedTuple):
@@ -63,20 +68,13 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument('--no-daemon', action='store_true', help='As ever: this ros2 has no daemon')
 
 
-class GraphNode(PollingNode):
-    """A node that knows how much slower everything goes on a machine that has more to do."""
-
-    slowness = 1.0
-
-
 @contextlib.contextmanager
-def node(name: str | None = None) -> Iterator[GraphNode]:
+def node(name: str | None = None) -> Iterator[PollingNode]:
     """A node that has discovered nothing yet."""
     prepare_middleware()
-    clock, used = time.monotonic(), time.process_time()
     try:
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-        own = GraphNode(
+        own = PollingNode(
             name or f'_ros2cli_{os.getpid()}',
             use_global_arguments=False,
             start_parameter_services=False,
@@ -85,8 +83,6 @@ def node(name: str | None = None) -> Iterator[GraphNode]:
         if not type(error).__module__.startswith(('rclpy', '_rclpy')):
             raise
         raise CommandError(str(error).split(', at /')[0]) from error
-    slowness = (time.monotonic() - clock) / max(time.process_time() - used, 1e-3)
-    own.slowness = min(max(slowness, 1.0), MOST_SLOWNESS)
     try:
         yield own
     finally:
@@ -96,8 +92,8 @@ def node(name: str | None = None) -> Iterator[GraphNode]:
 
 @contextlib.contextmanager
 def graph(
-    arguments: Any, needed: Callable[[GraphNode], object] | None = None
-) -> Iterator[GraphNode]:
+    arguments: Any, needed: Callable[[PollingNode], object] | None = None
+) -> Iterator[PollingNode]:
     """A node that has discovered what there is, ``needed`` in particular."""
     with node() as own:
         spin_time = getattr(arguments, 'spin_time', None)
@@ -106,7 +102,7 @@ def graph(
 
 
 @contextlib.contextmanager
-def graph_with(arguments: Any) -> Iterator[tuple[GraphNode, str]]:
+def graph_with(arguments: Any) -> Iterator[tuple[PollingNode, str]]:
     """A node that has discovered the one that is named, and the full name of that.
 
     Raises :class:`CommandError` where there is none.
@@ -124,15 +120,15 @@ def graph_with(arguments: Any) -> Iterator[tuple[GraphNode, str]]:
 
 
 def discover(
-    own: GraphNode,
+    own: PollingNode,
     spin_time: float | None = None,
     needed: Callable[[], bool] | None = None,
     *,
     at_once: bool = False,
 ) -> bool:
-    """Wait for ``spin_time`` [s], by default until the graph is quiet and what is needed there.
+    """Wait for ``spin_time`` [s], by default until the graph is known.
 
-    ``at_once`` ends the wait as soon as that is there. Returns whether it is.
+    ``at_once`` ends the wait as soon as what is needed is there. Returns whether it is.
     """
     start = changed = time.monotonic()
     seen: object = None
@@ -144,19 +140,31 @@ def discover(
         state = _state(own)
         if state != seen:
             seen, changed = state, now
-        passed, quiet = (now - start) / own.slowness, (now - changed) / own.slowness
         if spin_time is not None:
             over = now - start >= spin_time
-        elif held:
-            over = passed >= MOST_WAIT or (passed >= LEAST_WAIT and quiet >= QUIET)
         else:
-            over = passed >= UNSEEN_WAIT
+            known = now - changed >= QUIET and _complete(own, now - start)
+            over = known or now - start >= MOST_WAIT
         if over:
             return held
         time.sleep(_TICK)
 
 
-def _state(own: GraphNode) -> object:
+def _complete(own: PollingNode, waited: float) -> bool:
+    """Whether every participant of this machine is seen, and those of others have had the time."""
+    try:
+        there = local_participants(int(os.environ.get('ROS_DOMAIN_ID') or 0))
+    except OSError:
+        return waited >= ABROAD_WAIT
+    infos = [info for topic in _EVERYWHERE for info in own.get_publishers_info_by_topic(topic)]
+    participants = {
+        bytes(info.endpoint_gid[:_PREFIX]) for info in infos if info.node_name != _UNKNOWN
+    }
+    here = os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE') == 'LOCALHOST'
+    return len(participants) >= there and (here or waited >= ABROAD_WAIT)
+
+
+def _state(own: PollingNode) -> object:
     return (
         own.get_node_names_and_namespaces(),
         own.get_topic_names_and_types(),
@@ -174,18 +182,18 @@ def wait_until(condition: Callable[[], bool], timeout: float | None = None) -> b
     return True
 
 
-def nodes(own: GraphNode, *, hidden: bool = False) -> list[NodeName]:
+def nodes(own: PollingNode, *, hidden: bool = False) -> list[NodeName]:
     """The nodes on the graph, sorted, those of the same name as often as they are there."""
     found = (NodeName(*pair) for pair in own.get_node_names_and_namespaces())
     return sorted((each for each in found if hidden or not each.hidden), key=lambda each: each.full)
 
 
-def topics(own: GraphNode, *, hidden: bool = True) -> dict[str, list[str]]:
+def topics(own: PollingNode, *, hidden: bool = True) -> dict[str, list[str]]:
     """The topics on the graph with their types, sorted."""
     return _shown(own.get_topic_names_and_types(), hidden)
 
 
-def services(own: GraphNode, *, hidden: bool = True) -> dict[str, list[str]]:
+def services(own: PollingNode, *, hidden: bool = True) -> dict[str, list[str]]:
     """The services on the graph with their types, sorted."""
     return _shown(own.get_service_names_and_types(), hidden)
 
@@ -203,7 +211,7 @@ def absolute(name: str) -> str:
     return name if name.startswith('/') else f'/{name}'
 
 
-def ask(own: GraphNode, kind: type, service: str, request: Any) -> Any:
+def ask(own: PollingNode, kind: type, service: str, request: Any) -> Any:
     """The response of a service that may be asked twice.
 
     Raises :class:`CommandError` where there is no such service.
@@ -211,15 +219,15 @@ def ask(own: GraphNode, kind: type, service: str, request: Any) -> Any:
     return answer(own, client(own, kind, service), request, resend=RESEND)
 
 
-def client(own: GraphNode, kind: type, service: str) -> Any:
+def client(own: PollingNode, kind: type, service: str) -> Any:
     """A client of a service that is ready. Raises :class:`CommandError` where there is none."""
     made = own.create_client(kind, service)
-    if not wait_until(made.service_is_ready, SERVICE_PATIENCE * own.slowness):
+    if not wait_until(made.service_is_ready, SERVICE_PATIENCE):
         raise CommandError(f"Wait for service timed out: '{service}'")
     return made
 
 
-def answer(own: GraphNode, client: Any, request: Any, *, resend: float = math.inf) -> Any:
+def answer(own: PollingNode, client: Any, request: Any, *, resend: float = math.inf) -> Any:
     """The response of a service that is ready, waited for until it comes.
 
     It may be lost when the service has not seen who asks yet: ``resend`` [s] asks again.
@@ -255,6 +263,6 @@ def add_service_name(parser: Parser, text: str) -> None:
     complete(argument, lambda given: _seen(given, lambda own: list(services(own, hidden=False))))
 
 
-def _seen(given: Any, look: Callable[[GraphNode], list[str]]) -> list[str]:
+def _seen(given: Any, look: Callable[[PollingNode], list[str]]) -> list[str]:
     with graph(given) as own:
         return look(own)

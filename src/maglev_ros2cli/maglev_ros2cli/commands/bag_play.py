@@ -11,17 +11,17 @@ from rosbags.interfaces import Connection, ConnectionExtRosbag2
 from rosbags.rosbag2 import Reader
 from rosgraph_msgs.msg import Clock
 
+from maglev_node.polling import PollingNode
 from maglev_node.stamp import set_stamp
 from maglev_ros2cli.bags import add_bag_path, add_overrides, opened, overrides, profile
 from maglev_ros2cli.errors import CommandError
-from maglev_ros2cli.graph import GraphNode, discover, node
+from maglev_ros2cli.graph import discover, node
 from maglev_ros2cli.messages import find_type
 from maglev_ros2cli.parser import Verbs
 
 _CLOCK_RATE = 40.0
-_DISCOVERY = 0.5
-"""Time in which subscribers find the publishers before the first message [s]."""
-_DELIVERY = 1.0
+_DELIVERY = 3.0
+"""Longest wait for the last messages to arrive [s]."""
 
 
 def add(verbs: Verbs) -> None:
@@ -55,7 +55,8 @@ def play(arguments: Any) -> None:
     with opened(arguments.bag_path) as reader, node('rosbag2_player') as own:
         own.get_logger().info(f'Set rate to {arguments.rate:g}')
         player = _Player(own, reader, arguments)
-        discover(own, max(_DISCOVERY, arguments.delay))
+        discover(own)  # so that subscribers have the first message
+        time.sleep(arguments.delay)
         try:
             player.play()
             while arguments.loop:
@@ -68,7 +69,7 @@ def play(arguments: Any) -> None:
 class _Player:
     """The publishers for a bag."""
 
-    def __init__(self, own: GraphNode, reader: Reader, arguments: Any) -> None:
+    def __init__(self, own: PollingNode, reader: Reader, arguments: Any) -> None:
         self._reader = reader
         self._rate = arguments.rate
         self._start = reader.start_time + int(arguments.start_offset * 1e9)

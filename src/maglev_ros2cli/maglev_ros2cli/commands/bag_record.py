@@ -13,11 +13,11 @@ from rclpy.topic_or_service_is_hidden import topic_or_service_is_hidden
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.recorder import bag_qos, message_folder
 from maglev_monitor.bag.writer import BagWriter
-from maglev_node.polling import PolledSubscription
+from maglev_node.polling import PolledSubscription, PollingNode
 from maglev_ros2cli import qos
 from maglev_ros2cli.bags import add_overrides, overrides
 from maglev_ros2cli.errors import CommandError
-from maglev_ros2cli.graph import GraphNode, absolute, add_arguments, discover, node, topics
+from maglev_ros2cli.graph import absolute, add_arguments, discover, node, topics
 from maglev_ros2cli.messages import find_type
 from maglev_ros2cli.parser import Verbs, complete
 
@@ -81,7 +81,7 @@ def record(arguments: Any) -> None:
 class _Recorder:
     """The subscriptions of a recording, and what they bring."""
 
-    def __init__(self, own: GraphNode, writer: BagWriter, arguments: Any) -> None:
+    def __init__(self, own: PollingNode, writer: BagWriter, arguments: Any) -> None:
         self._own = own
         self._writer = writer
         self._arguments = arguments

@@ -8,9 +8,9 @@ from typing import Any
 from lifecycle_msgs.msg import TransitionDescription
 from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
 
+from maglev_node.polling import PollingNode
 from maglev_ros2cli.errors import CommandError
 from maglev_ros2cli.graph import (
-    GraphNode,
     add_arguments,
     add_node_name,
     answer,
@@ -79,7 +79,7 @@ def get(arguments: Any) -> None:
             print(f'{full}: {_state(own, full)}')
 
 
-def _state(own: GraphNode, full: str) -> str:
+def _state(own: PollingNode, full: str) -> str:
     state = ask(own, GetState, f'{full}/get_state', GetState.Request()).current_state
     return f'{state.label} [{state.id}]'
 
@@ -117,13 +117,13 @@ def set_(arguments: Any) -> None:
         print('Transitioning failed', file=sys.stderr)
 
 
-def _managed(own: GraphNode, *, hidden: bool) -> list[str]:
+def _managed(own: PollingNode, *, hidden: bool) -> list[str]:
     there = services(own)
     found = dict.fromkeys(each.full for each in nodes(own, hidden=hidden))
     return [full for full in found if _GET_STATE in there.get(f'{full}/get_state', ())]
 
 
-def _transitions(own: GraphNode, full: str) -> list[TransitionDescription]:
+def _transitions(own: PollingNode, full: str) -> list[TransitionDescription]:
     service = f'{full}/get_available_transitions'
     request = GetAvailableTransitions.Request()
     return list(ask(own, GetAvailableTransitions, service, request).available_transitions)

@@ -11,9 +11,9 @@ from rclpy.action import (
 )
 from rclpy.topic_or_service_is_hidden import topic_or_service_is_hidden
 
+from maglev_node.polling import PollingNode
 from maglev_ros2cli.errors import CommandError
 from maglev_ros2cli.graph import (
-    GraphNode,
     NodeName,
     absolute,
     add_arguments,
@@ -62,7 +62,7 @@ def info(arguments: Any) -> None:
     """A node's topics, services and actions."""
     full = absolute(arguments.node_name)
 
-    def same_name(own: GraphNode) -> list[NodeName]:
+    def same_name(own: PollingNode) -> list[NodeName]:
         return [each for each in nodes(own, hidden=True) if each.full == full]
 
     with graph(arguments, same_name) as own:
@@ -86,7 +86,7 @@ def info(arguments: Any) -> None:
             print('\n'.join(lines))
 
 
-def _parts(own: GraphNode, name: str, namespace: str) -> dict[str, list[tuple[str, list[str]]]]:
+def _parts(own: PollingNode, name: str, namespace: str) -> dict[str, list[tuple[str, list[str]]]]:
     return {
         'Subscribers': own.get_subscriber_names_and_types_by_node(name, namespace),
         'Publishers': own.get_publisher_names_and_types_by_node(name, namespace),

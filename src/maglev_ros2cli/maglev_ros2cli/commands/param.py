@@ -15,9 +15,9 @@ from rclpy.parameter import (
     parameter_value_to_python,
 )
 
+from maglev_node.polling import PollingNode
 from maglev_ros2cli.errors import CommandError
 from maglev_ros2cli.graph import (
-    GraphNode,
     add_arguments,
     add_node_name,
     ask,
@@ -101,7 +101,7 @@ def list_(arguments: Any) -> None:
                 _print_names(own, name.full, arguments)
 
 
-def _print_names(own: GraphNode, full: str, arguments: Any) -> None:
+def _print_names(own: PollingNode, full: str, arguments: Any) -> None:
     names = _names(own, full, arguments.param_prefixes)
     types = _types(own, full, names) if arguments.param_type else {}
     for name in names:
@@ -173,28 +173,28 @@ def dump(arguments: Any) -> None:
 # -- services --------------------------------------------------------------------------------------
 
 
-def _names(own: GraphNode, full: str, prefixes: tuple[str, ...] = ()) -> list[str]:
+def _names(own: PollingNode, full: str, prefixes: tuple[str, ...] = ()) -> list[str]:
     request = ListParameters.Request(prefixes=list(prefixes))
     response = ask(own, ListParameters, f'{full}/list_parameters', request)
     return sorted(response.result.names)
 
 
-def _values(own: GraphNode, full: str, names: list[str]) -> list[Any]:
+def _values(own: PollingNode, full: str, names: list[str]) -> list[Any]:
     request = GetParameters.Request(names=names)
     return list(ask(own, GetParameters, f'{full}/get_parameters', request).values)
 
 
-def _set(own: GraphNode, full: str, parameters: list[Parameter]) -> list[SetParametersResult]:
+def _set(own: PollingNode, full: str, parameters: list[Parameter]) -> list[SetParametersResult]:
     request = SetParameters.Request(parameters=parameters)
     return list(ask(own, SetParameters, f'{full}/set_parameters', request).results)
 
 
-def _descriptors(own: GraphNode, full: str, names: list[str]) -> list[ParameterDescriptor]:
+def _descriptors(own: PollingNode, full: str, names: list[str]) -> list[ParameterDescriptor]:
     request = DescribeParameters.Request(names=names)
     return list(ask(own, DescribeParameters, f'{full}/describe_parameters', request).descriptors)
 
 
-def _types(own: GraphNode, full: str, names: list[str]) -> dict[str, str]:
+def _types(own: PollingNode, full: str, names: list[str]) -> dict[str, str]:
     return {each.name: _TYPES[each.type][0] for each in _descriptors(own, full, names)}
 
 

@@ -7,9 +7,10 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
+from maglev_node.polling import PollingNode
 from maglev_ros2cli import qos
 from maglev_ros2cli.errors import CommandError
-from maglev_ros2cli.graph import GraphNode, absolute, add_arguments, add_topic_name, graph, topics
+from maglev_ros2cli.graph import absolute, add_arguments, add_topic_name, graph, topics
 from maglev_ros2cli.messages import Form, as_csv, as_yaml, find_type
 from maglev_ros2cli.parser import Verbs
 
@@ -72,7 +73,7 @@ def echo(arguments: Any) -> None:
                 return
 
 
-def the_type(own: GraphNode, topic: str) -> str:
+def the_type(own: PollingNode, topic: str) -> str:
     """The type of a topic's messages. Raises :class:`CommandError` when there is not one."""
     types = topics(own).get(topic)
     if not types:
@@ -86,7 +87,7 @@ def the_type(own: GraphNode, topic: str) -> str:
 
 
 def heard(
-    own: GraphNode, topic: str, kind: type, arguments: Any, *, raw: bool = False
+    own: PollingNode, topic: str, kind: type, arguments: Any, *, raw: bool = False
 ) -> Iterator[tuple[Any, int]]:
     """Messages of a topic with their times of reception [ns], None when there is none now."""
     profile = qos.to_hear(own, topic, arguments)

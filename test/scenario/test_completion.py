@@ -1,0 +1,58 @@
+"""What bash offers behind the scripts: their options, the values of these, files."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+OFFER = """
+. "$0/scenarios/complete.bash"
+complete -p "${1##*/}" >/dev/null || echo none
+COMP_CWORD=$(($# - 1)) COMPREPLY=()
+_complete_scenario "$1" "${@: -1}" "${@: -2:1}"
+printf '%s\n' "${COMPREPLY[@]}"
+"""
+
+
+def offered(*words: str, folder: Path = ROOT) -> set[str]:
+    """What is offered for the last of some words."""
+    command = ['bash', '-uc', OFFER, str(ROOT), *words]
+    result = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert result.stderr == ''
+    return set(result.stdout.split())
+
+
+@pytest.mark.parametrize('path', sorted(ROOT.glob('scenarios/*.sh')), ids=lambda path: path.name)
+def test_every_script_offers_its_options(path: Path) -> None:
+    assert '--help' in offered(str(path), '--')
+
+
+def test_values() -> None:
+    assert offered('./scenarios/ellipse.sh', '--stage', '') == {'plant', 'hw_bridge'}
+    assert offered('./scenarios/steps.sh', '--mode', 'real') == {'realtime'}
+    assert offered('./scenarios/compare.sh', '--laws', 'regu') == {'regulator_3dof'}
+    assert offered('./scenarios/ellipse.sh', '--duration', '') == set()
+
+
+def test_trajectories_come_first() -> None:
+    assert offered('./scenarios/trajectory.sh', 'ci') == {'circle'}
+    assert offered('./scenarios/trajectory.sh', 'circle', 'ci') == set()
+
+
+def test_overlays_are_those_of_params_and_of_the_folder(tmp_path: Path) -> None:
+    (tmp_path / 'pale.yaml').touch()
+    (tmp_path / 'pale.txt').touch()
+    (tmp_path / 'palest').mkdir()
+    script = str(ROOT / 'scenarios' / 'ellipse.sh')
+    found = offered(script, '--params', 'pa', folder=tmp_path)
+    assert {'pale.yaml', 'palest/', 'paper.yaml'} <= found
+    assert 'pale.txt' not in found
+
+
+def test_scripts_of_others_by_the_same_names_are_left_to_them(tmp_path: Path) -> None:
+    assert offered(str(tmp_path / 'compare.sh'), '--') == set()
+    assert offered('compare.sh', '--') == set()
