@@ -11,6 +11,7 @@ from flight import (
     fly,
     gap,
     idles,
+    impact_speed,
     landed_without_current,
     samples,
 )
@@ -54,8 +55,10 @@ def test_a_controller_disabled_or_in_a_fault_is_not_flown_with(
 
     watching.wait(lambda: gap(watching) < LOWER_STOP - 2e-4)
     assert watching.call('/controller/emergency_stop').success
-    graph['reference'].wait_for('the controller has cut the currents')
+    graph['reference'].wait_for('the controller lands by itself')
     watching.wait(lambda: phase(watching) == Reference.END)
+    watching.wait(lambda: mode(watching) == ControllerState.FAULT)
+    samples(watching, 10)
     refused = watching.call('/reference/lift_off')
     assert not refused.success
     services = '/controller/reset, then /controller/enable, then /reference/lift_off'
@@ -75,15 +78,27 @@ def test_a_controller_disabled_or_in_a_fault_is_not_flown_with(
 
 
 def test_emergency_stops_in_flight_and_the_way_back(nodes: Nodes, watching: Observer) -> None:
-    """The controller's: latched, and off the lower stop no lift-off; then the plant's: latched."""
+    """The controller's lands and is latched; the plant's too, and off its stop nothing lifts off."""
     graph = fly(nodes, LONG)
     watching.wait(lambda: airborne(watching))
     assert watching.call('/controller/emergency_stop').success
     watching.wait(lambda: mode(watching) == ControllerState.FAULT)
-    assert not np.any(watching.newest(CURRENTS).direct_current)
+    watching.wait(lambda: landed_without_current(watching))
+    assert impact_speed(watching) < 0.05
     assert not watching.call('/controller/enable', True).success
-    watching.wait(lambda: gap(watching) < 0.0181)  # the magnets pull it up
     assert watching.call('/controller/reset').success
+    assert watching.call('/controller/enable', True).success
+    watching.wait(lambda: mode(watching) == ControllerState.WAITING)
+    assert watching.call('/reference/lift_off').success
+    watching.wait(lambda: airborne(watching))
+
+    assert watching.call('/plant/emergency_stop').success
+    graph['plant'].wait_for('currents cut')
+    watching.wait(lambda: not np.any(watching.newest(TRUE_STATE).direct_current))
+    watching.wait(lambda: gap(watching) < 0.0181)  # the magnets pull it up
+    watching.wait(lambda: mode(watching) == ControllerState.DISABLED)  # having lost its platen
+    assert watching.call('/plant/reset').success
+    assert not watching.call('/plant/reset').success
     assert watching.call('/controller/enable', True).success
     samples(watching, 300)
     answer = watching.call('/reference/lift_off')
@@ -98,12 +113,6 @@ def test_emergency_stops_in_flight_and_the_way_back(nodes: Nodes, watching: Obse
     watching.wait(lambda: phase(watching) == Reference.REST)
     assert watching.call('/reference/lift_off').success
     watching.wait(lambda: airborne(watching))
-
-    assert watching.call('/plant/emergency_stop').success
-    graph['plant'].wait_for('currents cut')
-    watching.wait(lambda: not np.any(watching.newest(TRUE_STATE).direct_current))
-    assert watching.call('/plant/reset').success
-    assert not watching.call('/plant/reset').success
 
 
 @pytest.mark.parametrize('name', ['controller', 'reference'])
