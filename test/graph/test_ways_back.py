@@ -78,7 +78,7 @@ def test_a_controller_disabled_or_in_a_fault_is_not_flown_with(
 
 
 def test_emergency_stops_in_flight_and_the_way_back(nodes: Nodes, watching: Observer) -> None:
-    """The controller's lands and is latched; the plant's too, and off its stop nothing lifts off."""
+    """The controller's lands and is latched; the plant's too, and off its stop none lifts off."""
     graph = fly(nodes, LONG)
     watching.wait(lambda: airborne(watching))
     assert watching.call('/controller/emergency_stop').success
