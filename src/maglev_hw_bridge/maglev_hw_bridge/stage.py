@@ -23,19 +23,11 @@ from maglev_hw_bridge.encoders import Encoders, HomingError
 from maglev_hw_bridge.guard import Guard
 from maglev_hw_bridge.landing import Landing
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_model.stage import (
-    STOP_REMEDY,
-    EncoderSample,
-    Fault,
-    StageError,
-    Truth,
-    motor_currents,
-)
+from maglev_model.stage import EncoderSample, Fault, StageError, Truth, motor_currents
 
 FloatArray = NDArray[np.float64]
 
-_ON_THE_STOP = 2e-4  # this near the lower stop the platen rests [m],
-_AT_REST = 0.02  # when it is slower than this [m/s]
+_ON_THE_STOP, _AT_REST = 2e-4, 0.02  # nearer the lower stop and slower it rests [m], [m/s]
 
 
 class Mode(enum.Enum):
@@ -66,10 +58,8 @@ class BridgeStage:
         self.parameters = parameters or BridgeParameters()
         self.sample_time = self.parameters.sample_time
         self.realtime = realtime
-        self.mode = Mode.CLOSED
+        self.mode, self.why, self.late_ticks = Mode.CLOSED, '', 0
         self.fault: Fault | None = None
-        self.why = ''
-        self.late_ticks = 0
         try:
             self.driver = driver or make_driver(self.parameters, realtime)
         except DriverError as error:
@@ -80,8 +70,7 @@ class BridgeStage:
         self.guard = Guard(self.parameters)
         self.landing = Landing(self.parameters)
         self._counts = np.zeros(6, dtype=np.int32)
-        self._zero = np.zeros(4)
-        self._direct, self._quadrature = np.zeros(4), np.zeros(4)
+        self._zero, self._direct, self._quadrature = np.zeros((3, 4))
         self.flying = False  # current flows
         self._age = 0  # of the last fresh currents, in samples since what they answer
         self._lower_stop = self.parameters.machine.gap_max
@@ -218,7 +207,7 @@ class BridgeStage:
         return EncoderSample(length[:4].copy(), length.item(4), length.item(5))
 
     def write(self, direct_current: Any, quadrature_current: Any, age: int = 0) -> None:
-        """Currents of motors 1..4 [A], (4,) each, for the sample ``age`` before the last one read.
+        """Currents of motors 1..4 [A], (4,) each, for the sample ``age`` before the last one.
 
         Raises ValueError when a shape is wrong or a current is not finite or too large (the bridge
         then lands), StageError when the boards are lost.
@@ -265,9 +254,8 @@ class BridgeStage:
 
     def _on_the_stop(self) -> bool:
         """Whether the platen rests on its lower stop."""
-        state = self.guard.arrays
-        resting = state.position[0] > self._lower_stop - _ON_THE_STOP
-        return bool(resting and abs(state.rate[0]) < _AT_REST)
+        y, rate = self.guard.arrays.position[0], self.guard.arrays.rate[0]
+        return bool(y > self._lower_stop - _ON_THE_STOP and abs(rate) < _AT_REST)
 
     def _put_out(self) -> None:
         if self.mode is Mode.LANDING:
@@ -300,11 +288,9 @@ class BridgeStage:
             self.why = why
             self._begin_landing()
 
-    def stop(
-        self, why: str = 'emergency stop', *, kind: str = 'stop', remedy: str = STOP_REMEDY
-    ) -> None:
+    def stop(self, why: str = 'emergency stop', kind: str = 'stop', remedy: str = '') -> None:
         """Latch a fault with that reason; lands while everything needed for that is sound."""
-        self._raise_fault(kind, why, remedy)
+        self._raise_fault(kind, why, remedy or 'see to what made it necessary')
 
     def resume(self) -> None:
         """Follow the controller again after a landing without a fault."""
@@ -365,12 +351,11 @@ class BridgeStage:
             self._begin_landing()
 
     def _begin_landing(self) -> None:
-        state = self.guard.arrays
         if not self.flying or self._on_the_stop():
             self._disable()
             return
         self.mode = Mode.LANDING
-        self.landing.begin(state.position, state.rate)
+        self.landing.begin(self.guard.arrays.position, self.guard.arrays.rate)
 
     def _disable(self) -> None:
         self.mode = Mode.DISABLED
