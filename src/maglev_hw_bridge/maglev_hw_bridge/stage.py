@@ -58,8 +58,10 @@ class BridgeStage:
         self.parameters = parameters or BridgeParameters()
         self.sample_time = self.parameters.sample_time
         self.realtime = realtime
-        self.mode, self.why, self.late_ticks = Mode.CLOSED, '', 0
+        self.mode = Mode.CLOSED
         self.fault: Fault | None = None
+        self.why = ''
+        self.late_ticks = 0
         try:
             self.driver = driver or make_driver(self.parameters, realtime)
         except DriverError as error:
@@ -70,7 +72,8 @@ class BridgeStage:
         self.guard = Guard(self.parameters)
         self.landing = Landing(self.parameters)
         self._counts = np.zeros(6, dtype=np.int32)
-        self._zero, self._direct, self._quadrature = np.zeros((3, 4))
+        self._zero = np.zeros(4)
+        self._direct, self._quadrature = np.zeros(4), np.zeros(4)
         self.flying = False  # current flows
         self._age = 0  # of the last fresh currents, in samples since what they answer
         self._lower_stop = self.parameters.machine.gap_max
@@ -351,11 +354,12 @@ class BridgeStage:
             self._begin_landing()
 
     def _begin_landing(self) -> None:
+        state = self.guard.arrays
         if not self.flying or self._on_the_stop():
             self._disable()
             return
         self.mode = Mode.LANDING
-        self.landing.begin(self.guard.arrays.position, self.guard.arrays.rate)
+        self.landing.begin(state.position, state.rate)
 
     def _disable(self) -> None:
         self.mode = Mode.DISABLED
