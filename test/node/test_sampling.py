@@ -104,6 +104,19 @@ class Topic:
         self.newest = message
 
 
+class Timer:
+    """Ticks, or was cancelled."""
+
+    def __init__(self, period: float) -> None:
+        self.period, self.timer_period_ns, self.ticking = period, 0, True
+
+    def cancel(self) -> None:
+        self.ticking = False
+
+    def reset(self) -> None:
+        self.ticking = True
+
+
 class Inbox:
     """The queue of currents in real time."""
 
@@ -149,7 +162,7 @@ class MadeUpNode:
 
     def create_timer(self, period: float, action: Any, clock: Any) -> Any:
         self.tick = action
-        timer = SimpleNamespace(period=period, timer_period_ns=0, reset=lambda: None)
+        timer = Timer(period)
         self.timers.append(timer)
         return timer
 
@@ -382,3 +395,21 @@ def test_stopped_it_lands_first_and_takes_no_more_samples() -> None:
     sampling.start()
     node.tick()
     assert node.measured[-1] == 6
+
+
+@pytest.mark.parametrize('mode', ['lockstep', 'realtime'])
+def test_while_the_stage_is_lost_nothing_ticks(mode: str) -> None:
+    stage = MadeUpStage(real=True)
+    node = MadeUpNode(mode=mode)
+    sampling = Sampling(node, stage)  # type: ignore[arg-type,var-annotated]
+    sampling.start()
+    timer = node.timers[0]
+    stage.failing = True
+    if mode == 'realtime':
+        node.tick()
+    else:
+        sampling.land('for a test')
+        sampling._advance()
+    assert not timer.ticking
+    assert sampling.reset()[0]
+    assert timer.ticking
