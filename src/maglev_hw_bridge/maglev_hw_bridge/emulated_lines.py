@@ -59,4 +59,8 @@ class Lines:
     @property
     def enabled(self) -> bool:
         """Whether the amplifiers carry current: always where no line enables them."""
-        return self._enable < 0 or bool(self.levels[self._enable] == self._enable_level)
+        line = self._enable
+        if line < 0:
+            return True
+        driven = self._output[line] and not self._let_go
+        return bool((self._written[line] if driven else _PULLED_UP) == self._enable_level)

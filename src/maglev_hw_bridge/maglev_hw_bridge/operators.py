@@ -38,6 +38,9 @@ class Sight(enum.Enum):
 class Operator(Protocol):
     """Answers and acts."""
 
+    look: float
+    """Time needed to look at a load [s]."""
+
     def go_on(self, step: str) -> None:
         """Agree to a step, or raise StoppedError."""
         ...
@@ -65,6 +68,8 @@ class StoppedError(Exception):
 
 class Person:
     """Somebody at the terminal; ``yes``: agrees to every step without being asked."""
+
+    look = 2.0
 
     def __init__(self, yes: bool = False) -> None:
         self._yes = yes
@@ -98,6 +103,8 @@ def _agreed(question: str) -> bool:
 
 class EmulatedPerson:
     """Acts on emulated boards, and sees what is true of them."""
+
+    look = 0.05
 
     def __init__(self, boards: EmulatedBoards, go_on: Callable[[str], None]) -> None:
         self._boards = boards

@@ -18,7 +18,6 @@ from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.signal_parameters import PHASES
 
 _CURRENT = 0.5  # through the load [A]
-_LOOK = 2.0  # time to look at it [s]
 _PRESS = 15.0  # time to press the stop [s]
 
 
@@ -105,11 +104,11 @@ class Proof:
     def _enable_line(self) -> None:
         boards = self._boards
         with self._started():
-            self._drive(_LOOK)
+            self._drive(self._operator.look)
             enabled = self._operator.sees(Sight.CURRENT)
         with self._started():
             self._driver.disable()
-            self._drive(_LOOK)
+            self._drive(self._operator.look)
             disabled = self._operator.sees(Sight.CURRENT)
         if boards.enable_output < 0:
             if not enabled:
@@ -132,7 +131,7 @@ class Proof:
         boards = self._boards
         try:
             with self._started():
-                self._drive(_LOOK)
+                self._drive(self._operator.look)
                 self._operator.wait(2.0 * boards.watchdog)
                 flows = self._operator.sees(Sight.CURRENT)
                 enabled = boards.enable_output >= 0 and self._operator.sees(Sight.ENABLED)
@@ -160,7 +159,7 @@ class Proof:
             if not self._driver.stop_pressed:
                 raise WrongError('the emergency stop was not seen while current flowed')
             self._driver.disable()
-            self._drive(_LOOK)
+            self._drive(self._operator.look)
             flows = self._operator.sees(Sight.CURRENT)
         if flows:
             raise WrongError('current flows on after an emergency stop')
