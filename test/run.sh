@@ -118,7 +118,7 @@ if (($#)); then
 else
   # Mathematics, libraries and stand-ins side by side; then real nodes, two flights at a time; then,
   # with the machine to themselves, those that fly in real time.
-  flights=(test/scenario/test_scenarios.py test/graph) # the long ones first
+  flights=(test/scenario/test_scenarios.py test/graph test/ros2cli) # the long ones first
   run_pytest -p xdist -n logical --maxprocesses 4 --dist loadfile test "${flights[@]/#/--ignore=}" ||
     code=$?
   run_pytest -p xdist -n 2 -m 'not alone' "${flights[@]}" || code=$?
