@@ -61,7 +61,16 @@ everything_done() {
   environment_done && build_done && compiled && { [[ $wanted != test ]] || test_done; }
 }
 
+# What was made for another place names that place throughout, so it is made anew: say why.
+say_moved() {
+  local made
+  [[ ! -f $venv/.stamp ]] || read -ra made <"$venv/.stamp"
+  [[ -z ${made:-} || ${made[-2]} == "$root" ]] ||
+    say "this folder has come from ${made[-2]}: its environment is made anew"
+}
+
 make_environment() {
+  say_moved
   check_own_venv
   check_python "$branch"
   check_compiler

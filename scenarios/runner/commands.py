@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import NoReturn
 
-from runner.console import complain, say
+from runner.console import complain, talk_to, write
 from runner.folder import default_folder
 from runner.graph import Flight, Scenario
 from runner.options import (
@@ -83,7 +83,7 @@ def main(arguments: Sequence[str]) -> int:
         job = COMMANDS[name](options)
         return LATER if check_only else job()
     except HelpAskedError as text:
-        say(str(text))
+        write(str(text))
         return 0
     except WrongUseError as error:
         complain(f'{name}: error: {error}')
@@ -117,6 +117,10 @@ def _flight_command(name: str, description: str, call: str = '') -> Command:
         ),
         '--namespace': NAMESPACE,
         '--out': _out_option('the run is', name),
+        '--quiet': Option('say only what is wrong'),
+        '--json': Option(
+            'print the outcome with all figures as one line of JSON, all else to stderr'
+        ),
     }
     return Command(call or f'{name}.sh', description, options)
 
@@ -124,6 +128,10 @@ def _flight_command(name: str, description: str, call: str = '') -> Command:
 def _flight(scenario: Scenario, command: Command, options: Sequence[str]) -> Flight:
     given = command.parse(options)
     where = given.get('--namespace', [''])[-1]
+    if '--quiet' in given:
+        talk_to(None)
+    elif '--json' in given:
+        talk_to(2)
     return Flight(
         scenario,
         out=_out(scenario.name + where.replace('/', '-'), given),
@@ -132,6 +140,7 @@ def _flight(scenario: Scenario, command: Command, options: Sequence[str]) -> Fli
         duration=given.get('--duration', [''])[-1],
         overlays=tuple(given.get('--params', ())),
         namespace=where,
+        as_json='--json' in given,
     )
 
 

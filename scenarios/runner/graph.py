@@ -25,7 +25,7 @@ class Flight(NamedTuple):
     """A scenario as the user wants it.
 
     ``duration`` is a text [s], empty for the scenario's own; ``namespace`` an absolute name, empty
-    for none.
+    for none; ``as_json`` prints the outcome.
     """
 
     scenario: Scenario
@@ -35,6 +35,7 @@ class Flight(NamedTuple):
     duration: str = ''
     overlays: tuple[str, ...] = ()
     namespace: str = ''
+    as_json: bool = False
 
     def program(self, node: str) -> list[str]:
         """How to run a node; raises WrongUseError when it is not built."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from runner.console import complain, say
+from runner.console import GREEN, RED, complain, say
 from runner.folder import cannot_write, refuse_full
 from runner.graph import Flight, Scenario
 from runner.options import WrongUseError
@@ -42,9 +42,9 @@ def fly_all(out: Path, mode: str, namespace: str, *, quick: bool) -> int:
         complain(f'paper_tables: interrupted; finished runs are kept in {out}')
         return signals.code
     if code or failed:
-        say(f'paper_tables: FAILED{": " if failed else ""}{" ".join(failed)}')
+        say(f'paper_tables: FAILED{": " if failed else ""}{" ".join(failed)}', RED)
         return 1
-    say('paper_tables: passed')
+    say('paper_tables: passed', GREEN)
     return 0
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from runner.console import complain, say
+from runner.console import GREEN, complain, say, write
 from runner.folder import make_folder, say_where
 from runner.graph import START_ORDER, STOP_ORDER, Flight
 from runner.logs import NodeLog
@@ -36,10 +37,24 @@ def fly(flight: Flight, signals: Signals) -> int:
         passed = False
     if signals.code:
         complain(f'{name}: interrupted; what was recorded is kept:')
+    elif passed:
+        say(f'{name}: passed', GREEN)
     else:
-        say(f'{name}: {"passed" if passed else "FAILED"}')
+        complain(f'{name}: FAILED, see {flight.out}')
     say_where(flight.out)
+    if flight.as_json:
+        write(outcome(flight, passed))
     return signals.code or int(not passed)
+
+
+def outcome(flight: Flight, passed: bool) -> str:
+    """What came of a flight, with the content of its metrics.json, as one line of JSON."""
+    try:
+        figures = json.loads((flight.out / 'metrics.json').read_text(encoding='utf-8'))
+    except (OSError, ValueError):
+        figures = None
+    facts = {'scenario': flight.scenario.name, 'stage': flight.stage, 'mode': flight.mode}
+    return json.dumps({**facts, 'out': str(flight.out), 'passed': passed, 'metrics': figures})
 
 
 class Run:

@@ -19,9 +19,9 @@ def ros2(capfd: pytest.CaptureFixture[str]) -> Ros2:
     return ros2_command(capfd)
 
 
-@pytest.fixture(scope='session')
+@pytest.fixture(scope='module')
 def small(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Process]:
-    """The node ``/small``, active."""
+    """The node ``/small``, active, for the tests of a file: it must not meet those of others."""
     process = Process([sys.executable, str(NODE)], tmp_path_factory.mktemp('small') / 'log')
     try:
         process.wait_for('activate: active')

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import os
+import pty
 import resource
 import signal
 import subprocess
@@ -243,3 +245,60 @@ def test_a_program_that_leaves_a_child_is_ended_with_it(tmp_path: Path) -> None:
         check=False,
     )
     assert 'Z' in ended.stdout or not ended.stdout
+
+
+def test_quietly_only_what_is_wrong_is_said(tree: Tree) -> None:
+    assert tree.run('--quiet') == (0, '')
+    assert (tree.out / 'report.html').exists()
+    tree.behave('monitor', '1')
+    tree.behave('controller', 'warn')
+    code, output = tree.finish('--out', f'{tree.out}-2', '--quiet', script='ellipse')
+    assert code == 1
+    assert 'ellipse: controller: warning: ' in output
+    assert output.endswith(f'ellipse: FAILED, see {tree.out}-2\n')
+    assert 'um' not in output
+
+
+def test_json_is_all_there_is_on_the_standard_output(tree: Tree) -> None:
+    process = subprocess.Popen(
+        [tree.path / 'scenarios' / 'ellipse.sh', '--json', '--out', tree.out],
+        env={**os.environ, 'PATH': f'{tree.path}/bin:/usr/bin:/bin'},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    out, err = process.communicate(timeout=30)
+    outcome = json.loads(out)
+    assert outcome['passed'] is True
+    assert (outcome['scenario'], outcome['stage'], outcome['mode']) == (
+        *('ellipse', 'plant', 'lockstep'),
+    )
+    assert outcome['out'] == str(tree.out)
+    assert 'metrics' in outcome
+    assert 'ellipse: passed' in err
+    assert '\033' not in out + err
+
+
+@pytest.mark.parametrize('no_color', [True, False])
+def test_colours_are_for_a_terminal_that_wants_them(tree: Tree, no_color: bool) -> None:
+    reader, writer = pty.openpty()
+    environment = {**os.environ, 'PATH': f'{tree.path}/bin:/usr/bin:/bin'}
+    environment.pop('NO_COLOR', None)
+    process = subprocess.Popen(
+        [tree.path / 'scenarios' / 'ellipse.sh', '--out', tree.out],
+        env={**environment, 'NO_COLOR': '1'} if no_color else environment,
+        stdout=writer,
+        stderr=writer,
+    )
+    os.close(writer)
+    output = b''
+    while True:
+        try:
+            output += os.read(reader, 4096)
+        except OSError:  # all ends are closed
+            break
+    os.close(reader)
+    assert process.wait(30) == 0
+    passed = b'ellipse: passed' if no_color else b'\033[32mellipse: passed\033[0m'
+    assert passed in output
+    assert (b'\033' in output) != no_color

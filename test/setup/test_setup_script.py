@@ -217,6 +217,20 @@ def test_a_venv_of_somebody_else_is_not_touched(machine: Machine) -> None:
 
 
 @needs_wheels
+def test_a_moved_folder_is_made_anew_and_says_so(machine: Machine, tmp_path: Path) -> None:
+    (machine.bin / 'make').unlink()
+    venv = machine.root / '.venv'
+    venv.mkdir()
+    (venv / '.made-by-setup').touch()
+    for place, moved in (('/elsewhere/clone', True), (str(machine.root), False)):
+        (venv / '.stamp').write_text(f'1 wheels  {place} 0123\n')
+        code, lines = machine.setup()
+        assert code == 1
+        assert ('this folder has come from /elsewhere/clone' in lines[0]) == moved
+        assert 'missing: make' in lines[-1]
+
+
+@needs_wheels
 def test_no_network(machine: Machine) -> None:
     for name in ('python3', 'sleep'):
         (machine.bin / name).unlink(missing_ok=True)

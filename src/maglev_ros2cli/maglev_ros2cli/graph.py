@@ -25,7 +25,7 @@ QUIET = 0.15
 ABROAD_WAIT, MOST_WAIT = 1.0, 5.0
 """It takes at least so long where other machines may take part, and at most so long [s]."""
 
-SERVICE_PATIENCE = 5.0
+SERVICE_PATIENCE = 10.0
 """How long a service that should be there is waited for [s]."""
 
 RESEND = 2.0
