@@ -212,6 +212,7 @@ class Rig:
         """Put the platen somewhere, as by hand: (5,) each [m, rad] and per second."""
         self.stage.state[::2] = position
         self.stage.state[1::2] = 0.0 if velocity is None else velocity
+        self.stage.effects.winding.last[:] = self.stage.state
 
     @property
     def phase_current(self) -> FloatArray:

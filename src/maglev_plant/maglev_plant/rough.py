@@ -17,6 +17,7 @@ from maglev_model.compiled import compiled
 from maglev_model.machine import Machine
 from maglev_plant.amplifier import limit_phase, set_targets
 from maglev_plant.arrays import StageArrays
+from maglev_plant.effects.arrays import EffectArrays
 from maglev_plant.effects.balance import add_weight
 from maglev_plant.effects.drive import aim, command_phases
 from maglev_plant.effects.floor import shake
@@ -31,6 +32,19 @@ from maglev_plant.effects.modes import carry_modes
 from maglev_plant.effects.motors import add_motor_forces
 from maglev_plant.effects.winding import carry_currents, flowing_currents
 from maglev_plant.stops import apply_stops
+
+
+@compiled
+def _add_springs(
+    effects: EffectArrays, machine: Machine, state: FloatArray, force: FloatArray
+) -> None:
+    """Torsional springs, of the potential I k_s tilt²/2 (1 + growth (y - middle))."""
+    growth = effects.spring_growth
+    share = 1.0 + growth * (state[0] - effects.spring_gap)
+    phi, theta = machine.I_x * machine.k_s_phi, machine.I_x * machine.k_s_theta
+    force[3] -= phi * share * state[6]
+    force[4] -= theta * share * state[8]
+    force[0] -= 0.5 * growth * (phi * state[6] * state[6] + theta * state[8] * state[8])
 
 
 @compiled
@@ -59,8 +73,7 @@ def rough_derivative(
     force[1] -= effects.cable * state[2]
     force[2] -= effects.cable * state[4]
     if machine.motors != 1.0:
-        force[3] -= mass[3] * machine.k_s_phi * state[6]
-        force[4] -= mass[4] * machine.k_s_theta * state[8]
+        _add_springs(effects, machine, state, force)
     add_weight(effects.balance, state, force)
     add_motor_forces(machine, effects.motors, state, current, force)
     add_friction(effects.friction, state, elapsed, force)

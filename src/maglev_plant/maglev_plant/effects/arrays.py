@@ -38,6 +38,8 @@ class EffectArrays(Record):
     floor: FloorArrays
     heat: HeatArrays
     cable: float  # stiffness along x and z [N/m]
+    spring_growth: float  # of the torsional springs with the gap [1/m]
+    spring_gap: float  # where they are as in (7) [m]
 
 
 def effect_arrays(parameters: PlantParameters, machine: Machine, step: float) -> EffectArrays:
@@ -47,7 +49,7 @@ def effect_arrays(parameters: PlantParameters, machine: Machine, step: float) ->
     return EffectArrays(
         moving=any(
             getattr(effects, name) != getattr(_OFF, name)
-            for name in ('friction', 'modes', 'motor', 'balance', 'cable', 'floor', 'heat')
+            for name in ('friction', 'modes', 'motor', 'balance', 'spring', 'cable', 'floor', 'heat')
         )
         or effects.drive != _OFF.drive
         or effects.winding.voltage > 0.0,
@@ -64,4 +66,6 @@ def effect_arrays(parameters: PlantParameters, machine: Machine, step: float) ->
         floor=floor_arrays(parameters, step),
         heat=heat_arrays(parameters),
         cable=effects.cable.stiffness,
+        spring_growth=effects.spring.growth,
+        spring_gap=0.5 * (parameters.machine.gap_min + parameters.machine.gap_max),
     )

@@ -183,6 +183,19 @@ class BalanceParameters:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
+class SpringParameters:
+    """The torsional springs of (7), which are the bending guides."""
+
+    growth: float = parameter(
+        0.0,
+        'growth of both stiffnesses with the gap, from the middle of its range on: the guides are '
+        'then more or less drawn out; the tilts push the gap by as much',
+        unit='1/m',
+        within=(-120.0, 120.0),
+    )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class DriveParameters:
     """From the command to what the current loops aim at, phase by phase."""
 
@@ -326,6 +339,7 @@ class EffectParameters:
     modes: ModeParameters = group(ModeParameters)
     motor: MotorParameters = group(MotorParameters)
     balance: BalanceParameters = group(BalanceParameters)
+    spring: SpringParameters = group(SpringParameters)
     drive: DriveParameters = group(DriveParameters)
     winding: WindingParameters = group(WindingParameters)
     sensor: SensorParameters = group(SensorParameters)
