@@ -2,8 +2,8 @@
 
 The stage by itself, encoders and dynamics in a compiled loop, moving in x and z. Effects are those
 of ``params/rough.yaml``, one group at a time and all together, with as many steps a sample as the
-plain plant (2), and all together with their own (10). ``off`` is the plain plant measured again: how
-far its ratio is from 1 is what a ratio is worth here. Exits with 1 when all together, with two
+plain plant (2), and all together with their own (10). ``off`` is the plain plant measured again:
+how far its ratio is from 1 is what a ratio is worth here. Exits with 1 when all together, with two
 steps, cost more than the limit.
 """
 

@@ -11,10 +11,18 @@ import argparse
 import sys
 from pathlib import Path
 
-from maglev_model.axes import FloatArray
+from maglev_model.axes import AXES, THETA, FloatArray, X, Y, Z
 from maglev_model.parameters import read_yaml, replace
 from maglev_plant.parameters import PlantParameters
-from maglev_study.rough_flights import Errors, Outcome, experiments, fly_rough, laws, plant_of
+from maglev_study.rough_flights import (
+    Errors,
+    Outcome,
+    experiments,
+    fly_rough,
+    laws,
+    plant_of,
+    positioning,
+)
 
 PARAMS = Path(__file__).resolve().parents[1] / 'params'
 PERIOD = 1e-3
@@ -68,6 +76,13 @@ def main() -> int:
     for experiment in experiments(PERIOD, hold=options.hold):
         for law, controller in laws(PARAMS).items():
             print(line(law, fly_rough(rough, controller, experiment)), flush=True)
+    print('\n| law | axis | position | R, ISO 230-2 | reversal | bias | 3 s | accuracy |')
+    print('|:--|:--|:--|--:|--:|--:|--:|--:|')
+    for law, controller in laws(PARAMS).items():
+        for axis in (Y, X, Z, THETA):
+            for source, found in (positioning(rough, controller, axis) or {}).items():
+                cells_ = ' | '.join(f'{1e6 * value:.1f}' for value in found)
+                print(f'| {law} | {AXES[axis]} | {source} | {cells_} |', flush=True)
     if options.each:
         chosen = [e for e in experiments(PERIOD, 20.0, 1) if e.name in ('ellipse', 'hold 1')]
         for effect, plant in one_at_a_time().items():

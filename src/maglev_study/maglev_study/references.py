@@ -87,8 +87,8 @@ def _growing_ellipse(time: FloatArray, theta: float, grow: float) -> References:
 def scan(way: FloatArray, speed: FloatArray, passes: int, period: float) -> References:
     """To and fro about 25 mm at constant speed, from one end, ``passes`` times each way.
 
-    ``way`` (5,) to each side and ``speed`` (5,), which must take the same time; an axis with no
-    speed stands. In the last fifth of each way the speed turns smoothly.
+    ``way`` (5,) to each side and mean ``speed`` (5,), by which all axes must take one time; an axis
+    with no speed stands. In the first and the last tenth of each way the speed turns smoothly.
     """
     moving = speed > 0.0
     half = float(np.max(2.0 * way[moving] / speed[moving]))

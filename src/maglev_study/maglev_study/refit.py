@@ -69,8 +69,12 @@ def _sprung(p: FloatArray) -> dict[str, object]:
 
 
 def _loaded(p: FloatArray) -> dict[str, object]:
-    load = (max(float(p[5]), 0.0), 0.0, max(float(p[5]), 0.0), 0.0, 0.0)
+    load = (0.0, 0.0, max(float(p[5]), 0.0), 0.0, 0.0)
     return {**_sprung(p), 'effects.friction.tilt_load': load}
+
+
+def _growing(p: FloatArray) -> dict[str, object]:
+    return {**_sprung(p), 'effects.spring.growth': float(np.clip(p[5], -100.0, 100.0))}
 
 
 def _unlike(p: FloatArray) -> dict[str, object]:
@@ -80,9 +84,13 @@ def _unlike(p: FloatArray) -> dict[str, object]:
 _AXES = (0.303, 0.171, 0.149, 1.32)
 CANDIDATES = (
     Candidate('friction of the axes', _AXES, _AXES, lambda p: _friction(*p)),
-    Candidate('friction of each vertical guide', (0.52, *_AXES[1:3], 0.6), (0.5, *_AXES[1:]), _guides),
+    Candidate(
+        'friction of each vertical guide', (0.52, *_AXES[1:3], 0.6), (0.5, *_AXES[1:]), _guides
+    ),
     Candidate('axes, spring of theta unknown', (*_AXES, 0.8), (*_AXES, 1.0), _sprung),
-    Candidate('spring, friction grows with tilt', (*_AXES, 0.8, 30.0), (*_AXES, 1.0, 30.0), _loaded),
+    Candidate(
+        'spring, friction grows with tilt', (*_AXES, 0.8, 30.0), (*_AXES, 1.0, 30.0), _loaded
+    ),
     Candidate('spring, motors 2 and 4 unlike', (*_AXES, 0.8, 0.02), (*_AXES, 1.0, 0.02), _unlike),
 )
 

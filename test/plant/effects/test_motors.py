@@ -47,7 +47,9 @@ def platen_energy(s: NDArray[np.float64]) -> float:
     kinetic += 0.5 * (rest[0] * w_phi**2 + rest[1] * w_theta**2)
     height = y + ASIDE_X * theta - ASIDE_Z * phi - 0.5 * BELOW * (theta**2 + phi**2)
     potential = -M.M_y * M.G * height + 0.5 * 200.0 * (x**2 + z**2)
-    potential += 0.5 * (1.0 + 30.0 * (y - 0.0245)) * M.I_x * (M.k_s_phi * phi**2 + M.k_s_theta * theta**2)
+    potential += (
+        0.5 * (1.0 + 30.0 * (y - 0.0245)) * M.I_x * (M.k_s_phi * phi**2 + M.k_s_theta * theta**2)
+    )
     wave = 2.0 * math.pi / M.t_1
     for i, (at_x, at_z) in enumerate(MOTORS):
         gap = y + at_x * math.sin(theta) - at_z * math.sin(phi)

@@ -49,7 +49,16 @@ def effect_arrays(parameters: PlantParameters, machine: Machine, step: float) ->
     return EffectArrays(
         moving=any(
             getattr(effects, name) != getattr(_OFF, name)
-            for name in ('friction', 'modes', 'motor', 'balance', 'spring', 'cable', 'floor', 'heat')
+            for name in (
+                'friction',
+                'modes',
+                'motor',
+                'balance',
+                'spring',
+                'cable',
+                'floor',
+                'heat',
+            )
         )
         or effects.drive != _OFF.drive
         or effects.winding.voltage > 0.0,
