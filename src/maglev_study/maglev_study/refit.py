@@ -88,10 +88,9 @@ CANDIDATES = (
         'friction of each vertical guide', (0.52, *_AXES[1:3], 0.6), (0.5, *_AXES[1:]), _guides
     ),
     Candidate('axes, spring of theta unknown', (*_AXES, 0.8), (*_AXES, 1.0), _sprung),
-    Candidate(
-        'spring, friction grows with tilt', (*_AXES, 0.8, 30.0), (*_AXES, 1.0, 30.0), _loaded
-    ),
-    Candidate('spring, motors 2 and 4 unlike', (*_AXES, 0.8, 0.02), (*_AXES, 1.0, 0.02), _unlike),
+    Candidate('spring, tilt presses z', (*_AXES, 0.7, 8.5), (*_AXES, 1.0, 10.0), _loaded),
+    Candidate('spring that grows with the gap', (*_AXES, 0.7, 10.0), (*_AXES, 1.0, 10.0), _growing),
+    Candidate('spring, motors 2 and 4 unlike', (*_AXES, 0.7, 0.02), (*_AXES, 1.0, 0.02), _unlike),
 )
 
 
