@@ -22,15 +22,20 @@ DOCUMENTS = [
 ]
 
 
+NATIVE = ('security',)
+"""Commands that the documents tell for a native installation only."""
+
+
 def told_lines() -> list[tuple[str, str]]:
     """Every command ``ros2 ...`` of the documents, in blocks or within a text."""
     found = []
     for path in DOCUMENTS:
         text = re.sub(r'^# ?', '', path.read_text(encoding='utf-8'), flags=re.MULTILINE)
+        text = text.replace('\\\n', '')
         inline = re.findall(r'(?<!`)`(ros2 [^`]+)`(?!`)', text)
         block = re.findall(r'^ *(?:nice )?(ros2 \w.*)$', text, re.MULTILINE)
         for line in [*(' '.join(each.split()) for each in inline), *block]:
-            if '`' not in line:
+            if '`' not in line and line.split()[1] not in NATIVE:
                 found.append((path.name, line))
     return found
 
