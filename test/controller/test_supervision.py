@@ -5,9 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from maglev_controller.bumpless_transfer import model_maps
 from maglev_controller.parameters import ControllerParameters
+from maglev_controller.regulator import Regulator
 from maglev_controller.supervision import Supervisor
+from maglev_model.controller_watch import Status
 from maglev_model.modes import Mode
+from maglev_model.parameters import ParameterError, build
 from maglev_model.phases import Phase
 
 STOP = np.array([0.031, 0.0, 0.0, 0.0, 0.0])
@@ -26,11 +30,13 @@ class Flight:
         self.supervisor = supervisor
         self.sequence = -1
 
-    def step(self, phase: Phase, wanted: np.ndarray, gap: float, x: float = 0.0) -> Mode:
+    def step(
+        self, phase: Phase, wanted: np.ndarray, gap: float, x: float = 0.0, segment: int = 0
+    ) -> Mode:
         """The mode after a sample with the platen level at ``gap`` and ``x``."""
         self.sequence += 1
         references = self.supervisor.references
-        references.store(self.sequence, phase, 0, wanted, np.zeros(5), np.zeros(5))
+        references.store(self.sequence, phase, segment, wanted, np.zeros(5), np.zeros(5))
         row = references.find(self.sequence)
         self.supervisor.step(row, np.full(4, gap), x, 0.0)
         return self.supervisor.mode
@@ -40,7 +46,7 @@ def test_an_enable_waits_for_the_next_lift_off(supervisor: Supervisor) -> None:
     flight = Flight(supervisor)
     flight.step(Phase.REST, STOP, 0.031)
     assert flight.step(Phase.TRACK, HOVER, 0.031) == Mode.REGULATING
-    supervisor.cut('emergency stop')
+    supervisor.give_up('a defect')
     assert flight.step(Phase.TRACK, HOVER, 0.031) == Mode.FAULT
     assert supervisor.reset_fault()[0]
     assert supervisor.enable()[0]
@@ -58,6 +64,244 @@ def test_a_landing_cannot_be_called_off(supervisor: Supervisor) -> None:
     assert supervisor.disable()[0]
     assert not supervisor.enable()[0]
     assert flight.step(Phase.TRACK, HOVER, 0.025) == Mode.LANDING
+
+
+# -- every call in every state ---------------------------------------------------------------------
+
+
+def waiting() -> Supervisor:
+    return Supervisor(ControllerParameters())
+
+
+def regulating() -> Supervisor:
+    supervisor = waiting()
+    flight = Flight(supervisor)
+    flight.step(Phase.REST, STOP, 0.031)
+    assert flight.step(Phase.TRACK, HOVER, 0.025) == Mode.REGULATING
+    return supervisor
+
+
+def disabled() -> Supervisor:
+    supervisor = waiting()
+    supervisor.disable()
+    return supervisor
+
+
+def landing() -> Supervisor:
+    supervisor = regulating()
+    supervisor.disable()
+    return supervisor
+
+
+def stopping() -> Supervisor:
+    supervisor = regulating()
+    supervisor.stop('stopped')
+    return supervisor
+
+
+def stopped() -> Supervisor:
+    supervisor = waiting()
+    supervisor.stop('stopped')
+    return supervisor
+
+
+def given_up() -> Supervisor:
+    supervisor = regulating()
+    supervisor.give_up('given up')
+    return supervisor
+
+
+STATES = {
+    f.__name__: f for f in (waiting, regulating, disabled, landing, stopping, stopped, given_up)
+}
+MODES = {
+    'waiting': Mode.WAITING,
+    'regulating': Mode.REGULATING,
+    'disabled': Mode.DISABLED,
+    'landing': Mode.LANDING,
+    'stopping': Mode.LANDING,
+    'stopped': Mode.FAULT,
+    'given_up': Mode.FAULT,
+}
+# What each call makes of each state: success, the mode at once, and the mode it comes to rest in.
+D, W, R, L, F = Mode.DISABLED, Mode.WAITING, Mode.REGULATING, Mode.LANDING, Mode.FAULT
+TABLE: dict[str, dict[str, tuple[bool, Mode, Mode]]] = {
+    'enable': {
+        'waiting': (True, W, W),
+        'regulating': (True, R, R),
+        'disabled': (True, W, W),
+        'landing': (False, L, D),
+        'stopping': (False, L, F),
+        'stopped': (False, F, F),
+        'given_up': (False, F, F),
+    },
+    'disable': {
+        'waiting': (True, D, D),
+        'regulating': (True, L, D),
+        'disabled': (True, D, D),
+        'landing': (True, L, D),
+        'stopping': (True, L, F),
+        'stopped': (True, F, F),
+        'given_up': (True, F, F),
+    },
+    'stop': {
+        'waiting': (True, F, F),
+        'regulating': (True, L, F),
+        'disabled': (True, F, F),
+        'landing': (True, L, F),
+        'stopping': (True, L, F),
+        'stopped': (True, F, F),
+        'given_up': (True, F, F),
+    },
+    'reset_fault': {
+        'waiting': (False, W, W),
+        'regulating': (False, R, R),
+        'disabled': (False, D, D),
+        'landing': (False, L, D),
+        'stopping': (False, L, F),
+        'stopped': (True, D, D),
+        'given_up': (True, D, D),
+    },
+}
+
+
+@pytest.mark.parametrize('state', STATES)
+@pytest.mark.parametrize('call', TABLE)
+def test_every_call_in_every_state(call: str, state: str) -> None:
+    supervisor = STATES[state]()
+    assert supervisor.mode == MODES[state]
+    arguments = ('the test',) if call == 'stop' else ()
+    success, at_once, at_last = TABLE[call][state]
+    assert getattr(supervisor, call)(*arguments)[0] == success
+    assert supervisor.mode == at_once
+    flight = Flight(supervisor)
+    flight.sequence = 10
+    for _ in range(2450):  # a landing takes 2.4 s
+        flight.step(Phase.TRACK, HOVER, 0.025)
+        flew = supervisor.flying
+        assert flew == bool(np.any(supervisor.direct_current))
+        expected = Status.FLYING if flew else Status.RESTING
+        if state == 'given_up' and call != 'reset_fault':
+            expected = Status.GAVE_UP
+        assert supervisor.status == expected
+        if not flew:
+            break
+    assert supervisor.mode == at_last
+
+
+@pytest.mark.parametrize('state', STATES)
+def test_a_controller_that_gives_up_says_so_where_it_flew(state: str) -> None:
+    supervisor = STATES[state]()
+    flew = supervisor.flying or state == 'given_up'
+    supervisor.give_up('for a reason')
+    assert (supervisor.mode, supervisor.reason) == (Mode.FAULT, 'for a reason')
+    assert not np.any(supervisor.direct_current)
+    assert supervisor.status == (Status.GAVE_UP if flew else Status.RESTING)
+    assert supervisor.reset_fault()[0]
+    assert supervisor.status == Status.RESTING
+
+
+@pytest.mark.parametrize(
+    ('state', 'mode'),
+    [
+        ('waiting', W),
+        ('regulating', W),
+        ('disabled', D),
+        ('landing', W),
+        ('stopping', F),
+        ('stopped', F),
+        ('given_up', F),
+    ],
+)
+def test_a_stage_that_begins_anew_ends_flights_but_no_faults(state: str, mode: Mode) -> None:
+    supervisor = STATES[state]()
+    supervisor.restart()
+    assert supervisor.mode == mode
+    assert not np.any(supervisor.direct_current)
+    flight = Flight(supervisor)
+    if mode == W and state != 'waiting':
+        assert flight.step(Phase.TRACK, HOVER, 0.031) == W  # not from the middle of a flight
+        assert flight.step(Phase.REST, STOP, 0.031) == W
+        assert flight.step(Phase.TRACK, HOVER, 0.031) == R
+
+
+@pytest.mark.parametrize('call', ['disable', 'stop'])
+def test_a_landing_goes_on_whoever_asks_for_another(call: str) -> None:
+    plain, asked = landing(), landing()
+    arguments = ('the test',) if call == 'stop' else ()
+    for n in range(300):
+        if n == 100:
+            getattr(asked, call)(*arguments)
+        for supervisor in (plain, asked):
+            supervisor.step(-1, np.full(4, 0.025), 0.0, 0.0)
+    assert np.array_equal(asked.direct_current, plain.direct_current)
+
+
+def test_a_measurement_that_cannot_be_believed_is_given_up() -> None:
+    for state in (regulating, landing, stopping):
+        supervisor = state()
+        flight = Flight(supervisor)
+        flight.sequence = 10
+        assert flight.step(Phase.TRACK, HOVER, float('nan')) == Mode.FAULT
+        assert supervisor.status == Status.GAVE_UP
+        assert 'not finite' in supervisor.reason
+
+
+@pytest.mark.parametrize('restart', [False, True])
+def test_models_begin_anew_at_a_step_where_that_is_wanted(restart: bool) -> None:
+    parameters = build(ControllerParameters, {'internal_model.restart_at_step': restart})
+    supervisor = Supervisor(parameters)
+    flight = Flight(supervisor)
+    flight.step(Phase.REST, STOP, 0.031)
+    for _ in range(50):
+        flight.step(Phase.TRACK, HOVER, 0.0252)
+    learned = np.abs(supervisor.regulator.internal_model[0])
+    flight.step(Phase.STEP, HOVER, 0.0252, segment=1)
+    now = np.abs(supervisor.regulator.internal_model[0])
+    assert learned > 0.0
+    assert (now == 0.0) == restart
+    for _ in range(50):
+        flight.step(Phase.STEP, HOVER, 0.0252, segment=1)
+    flight.step(Phase.TRACK, HOVER, 0.0252, segment=2)  # which is no step
+    assert np.abs(supervisor.regulator.internal_model[0]) > 0.0
+
+
+def test_the_end_of_a_reference_off_the_stop_is_a_landing() -> None:
+    for gap, mode in ((0.0306, Mode.WAITING), (0.0304, Mode.LANDING)):
+        flight = Flight(regulating())
+        flight.sequence = 10
+        assert flight.step(Phase.END, STOP, gap) == mode
+    flight = Flight(regulating())
+    flight.supervisor.step(-1, np.full(4, 0.031), 0.0, 0.0)
+    assert flight.supervisor.mode == Mode.LANDING  # a reference that is lost
+
+
+def test_a_second_retuning_during_the_first_ones_fade_makes_no_jump() -> None:
+    supervisor = regulating()
+    flight = Flight(supervisor)
+    flight.sequence = 10
+    for _ in range(20):
+        flight.step(Phase.TRACK, HOVER, 0.0251)
+    for bandwidth in (180.0, 240.0):
+        before = supervisor.regulator.virtual_input.copy()
+        changed = build(ControllerParameters, {'y.bandwidth': bandwidth})
+        regulator = Regulator(changed)
+        supervisor.adopt(regulator, model_maps(supervisor.regulator.arrays, regulator.arrays))
+        flight.step(Phase.TRACK, HOVER, 0.0251)
+        step = abs(supervisor.regulator.virtual_input[0] - before[0])
+        assert step < 0.05 * abs(before[0])
+
+
+def test_what_cannot_change_in_flight_is_refused_also_when_it_took_off_meanwhile() -> None:
+    supervisor = waiting()
+    heavier = Regulator(build(ControllerParameters, {'machine.mass_y': 7.5}))
+    maps = model_maps(supervisor.regulator.arrays, heavier.arrays)
+    flying = regulating()
+    with pytest.raises(ParameterError, match='mass_y'):
+        flying.adopt(heavier, maps)
+    assert flying.parameters == ControllerParameters()
+    supervisor.adopt(heavier, maps)
+    assert supervisor.parameters.machine.mass_y == 7.5
 
 
 @pytest.mark.parametrize(

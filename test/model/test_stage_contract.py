@@ -31,6 +31,7 @@ STAGES: dict[str, Callable[[], Stage]] = {
     'hw_bridge, real time': lambda: BridgeStage(BRIDGE, realtime=True),
 }
 ZERO = np.zeros(4)
+FALLING = np.full(4, 0.1)  # [A]
 LIFTING = np.full(4, -0.6)  # [A]; for some samples only: it falls back, not up to the magnets
 
 
@@ -150,6 +151,28 @@ def test_without_fresh_currents_for_long_it_comes_down_with_a_fault(stage: Stage
     assert lifts(stage)
 
 
+def test_fresh_currents_that_answer_old_samples_are_no_fresh_ones(stage: Stage) -> None:
+    lift(stage, 3)
+    for age in (1, 2, 3, 4):
+        stage.write(LIFTING, ZERO, age)
+        stage.read()
+        assert stage.flying
+    assert stage.fault is None
+    stage.write(LIFTING, ZERO, 6)
+    assert stage.fault is not None
+    assert (stage.fault.kind, stage.fault.reason) == ('stale', 'no fresh currents for 6 ms')
+    come_to_rest(stage)
+    assert not lifts(stage)
+
+
+def test_a_stop_says_whose_fault_it_is(stage: Stage) -> None:
+    lift(stage)
+    stage.stop('it is mad', kind='controller', remedy='calm it')
+    assert stage.fault is not None
+    assert stage.fault[:3] == ('controller', 'it is mad', 'calm it')
+    come_to_rest(stage)
+
+
 def test_at_rest_it_needs_no_fresh_currents(stage: Stage) -> None:
     stage.read()
     stage.write(ZERO, ZERO)
@@ -208,7 +231,7 @@ def test_a_fault_outlives_a_deactivation(stage: Stage) -> None:
 
 def test_the_truth_is_of_the_sample_read_last(stage: Stage) -> None:
     truths = []
-    for current in (LIFTING, LIFTING, ZERO):
+    for current in (LIFTING, LIFTING, FALLING):
         for _ in range(12):
             stage.write(current, ZERO)
             sample = stage.read()
@@ -219,7 +242,7 @@ def test_the_truth_is_of_the_sample_read_last(stage: Stage) -> None:
             truths.append(truth)
     assert [len(array) for array in truths[0][1:]] == [4, 4, 4]
     assert truths[23].direct_current == pytest.approx(LIFTING, abs=2e-2)
-    assert truths[35].direct_current == pytest.approx(ZERO, abs=2e-2)
+    assert truths[35].direct_current == pytest.approx(FALLING, abs=2e-2)
     assert not truths[35].quadrature_current.any()
     assert np.all(truths[35].thermal_load > truths[0].thermal_load)
     assert truths[0].state[0] > truths[35].state[0]  # theirs to keep

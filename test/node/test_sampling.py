@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from types import SimpleNamespace
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
+from made_up_node import MadeUpNode
 from rosgraph_msgs.msg import Clock
 
 from maglev_model.stage import EncoderSample, Fault, StageError, Truth
 from maglev_msgs.msg import Currents, Measurement, PlantState
 from maglev_node.sampling import Sampling
-from maglev_node.stage_parameters import ClockedStageParameters
-from maglev_node.stamp import nanoseconds
+from maglev_node.stamp import set_stamp
 from maglev_node.topics import MEASUREMENT, TRUE_STATE
 
 ZERO = np.zeros(4)
@@ -33,6 +32,7 @@ class MadeUpStage:
         self.flying = False
         self.calls: list[str] = []
         self.written: list[float] = []
+        self.ages: list[int] = []
         self.failing = False
         self.endurance = 3
         self._truth = Truth(np.arange(10.0), ZERO + 1.0, ZERO + 2.0, ZERO + 3.0) if truth else None
@@ -52,11 +52,12 @@ class MadeUpStage:
         self._call('read')
         return EncoderSample(np.full(4, 0.031), 0.001, 0.002)
 
-    def write(self, direct_current: Any, quadrature_current: Any) -> None:
+    def write(self, direct_current: Any, quadrature_current: Any, age: int = 0) -> None:
         self._call('write')
         if not np.all(np.isfinite(direct_current)):
             raise ValueError('a current is nan')
         self.written.append(float(direct_current[0]))
+        self.ages.append(age)
         self.flying = bool(np.any(direct_current)) and self.fault is None
 
     def hold(self) -> None:
@@ -67,10 +68,10 @@ class MadeUpStage:
     def land(self, why: str) -> None:
         self.calls.append(f'land: {why}')
 
-    def stop(self, why: str = 'emergency stop') -> None:
+    def stop(self, why: str = 'emergency stop', *, kind: str = 'stop', remedy: str = '') -> None:
         if self.fault is None:
-            self.fault = Fault('stop', why, 'see to it', True)
-        self.flying = False
+            self.fault = Fault(kind, why, remedy, not self.restartable)
+        self.flying = self.flying and self.restartable  # as the bridge, which lands
 
     def reset(self) -> tuple[bool, str]:
         cleared, self.fault = self.fault is not None or self.failing, None
@@ -87,85 +88,10 @@ class MadeUpStage:
         return self._truth
 
 
-class Topic:
-    """A publisher; messages are noted by what tells them apart."""
-
-    def __init__(self) -> None:
-        self.sequences: list[int] = []
-        self.newest: Any = None
-        self.stamps: list[int] = []
-
-    def publish(self, message: Any) -> None:
-        if isinstance(message, Clock):
-            self.stamps.append(nanoseconds(message.clock))
-            return
-        self.sequences.append(message.sequence)
-        self.stamps.append(nanoseconds(message.header.stamp))
-        self.newest = message
-
-
-class Inbox:
-    """The queue of currents in real time."""
-
-    def __init__(self) -> None:
-        self.messages: list[Any] = []
-
-    def take(self) -> Iterator[tuple[Any, int]]:
-        waiting, self.messages = self.messages, []
-        return ((message, 0) for message in waiting)
-
-
-class MadeUpNode:
-    """What sampling asks of a node."""
-
-    steady_clock = None
-
-    def __init__(self, **parameters: Any) -> None:
-        self.parameters = ClockedStageParameters(**parameters)
-        self.topics: dict[type, Topic] = {}
-        self.errors: list[str] = []
-        self.failed: list[str] = []
-        self.timers: list[Any] = []
-        self.fail = self.failed.append
-        self.inbox = Inbox()
-        self.subscribers: dict[str, list[str]] = {}
-
-    def get_namespace(self) -> str:
-        return '/'
-
-    def get_subscriptions_info_by_topic(self, topic: str) -> list[Any]:
-        names = self.subscribers.get(topic, [])
-        return [SimpleNamespace(node_name=name, node_namespace='/') for name in names]
-
-    def create_publisher(self, message_type: type, _topic: str, _qos: Any) -> Topic:
-        return self.topics.setdefault(message_type, Topic())
-
-    def create_subscription(self, _type: type, _topic: str, callback: Any, _qos: Any) -> Any:
-        self.answer = callback
-        return SimpleNamespace(topic_name='/stage/currents', get_publisher_count=lambda: 0)
-
-    def poll(self, _topic: str, _type: type) -> Inbox:
-        return self.inbox
-
-    def create_timer(self, period: float, action: Any, clock: Any) -> Any:
-        self.tick = action
-        timer = SimpleNamespace(period=period, timer_period_ns=0, reset=lambda: None)
-        self.timers.append(timer)
-        return timer
-
-    def destroy_timer(self, timer: Any) -> None:
-        self.timers.remove(timer)
-
-    def get_logger(self) -> Any:
-        return SimpleNamespace(error=self.errors.append)
-
-    @property
-    def measured(self) -> list[int]:
-        return self.topics[Measurement].sequences
-
-
-def currents(sequence: int, current: float = 0.0) -> Currents:
-    return Currents(sequence=sequence, direct_current=[current] * 4)
+def currents(sequence: int, current: float = 0.0, session: int = 1) -> Currents:
+    """What a controller sends for a sample, but for the stamp."""
+    status = Currents.FLYING if current else Currents.RESTING
+    return Currents(sequence=sequence, direct_current=[current] * 4, session=session, status=status)
 
 
 def start(stage: MadeUpStage, **parameters: Any) -> tuple[Any, MadeUpNode]:
@@ -323,18 +249,110 @@ def test_a_restartable_one_waits_for_a_reset() -> None:
 def test_real_time_takes_the_newest_currents_and_counts_missing_ones() -> None:
     stage = MadeUpStage(real=True)
     sampling, node = start_realtime(stage)
-    answers = ([0], [1, 2], [], [], [3, 4, 5], [6])  # to the samples that tick after tick follow
+    answers = ([], [1], [2], [], [], [3, 4, 5], [6])  # to the samples that tick after tick follow
     for newest in answers:
-        node.inbox.messages = [currents(number, 0.1 * number) for number in newest]
+        node.inbox.messages = [currents(number, 0.1 * (number - 1)) for number in newest]
         node.tick()
-    assert node.measured == [1, 2, 3, 4, 5, 6]
-    assert stage.written == pytest.approx([0.0, 0.2, 0.5, 0.6])
+    assert node.measured == [1, 2, 3, 4, 5, 6, 7]
+    assert stage.written == pytest.approx([0.0, 0.1, 0.4, 0.5])
+    assert stage.ages == [1, 1, 1, 1]
     assert stage.calls[2:] == [
-        *('read', 'write', 'read', 'write', 'read', 'hold', 'read', 'hold'),
+        *('read', 'hold', 'read', 'write', 'read', 'write', 'read', 'hold', 'read', 'hold'),
         *('read', 'write', 'read', 'write'),
     ]
-    assert sampling.late_samples == 1  # at sample 4, with the currents for sample 2
+    assert sampling.late_samples == 2  # at samples 4 and 5, with the currents for sample 2
     assert node.timers[0].timer_period_ns > 0
+
+
+def test_the_age_of_currents_is_told_to_the_stage() -> None:
+    stage = MadeUpStage(real=True)
+    _, node = start_realtime(stage)
+    for answer in (0, 1, 2, 0, 3, 0, 4):
+        node.inbox.messages = [currents(answer, 0.1 * (answer - 1))] if answer else []
+        node.tick()
+    assert stage.ages == [1, 1, 2, 3]  # by their numbers, however regularly they come
+
+
+IN_FLIGHT: dict[str, tuple[Callable[[int], list[Currents]], str]] = {
+    'given up': (
+        lambda n: [Currents(sequence=n - 1, session=1, status=Currents.GAVE_UP)],
+        'the controller gave up',
+    ),
+    'somebody else': (lambda n: [currents(n, 0.5, session=2)], 'somebody else'),
+    'somebody else, who rests': (lambda n: [currents(n, session=2)], 'somebody else'),
+    'nobody': (lambda n: [currents(n, 0.5, session=0)], 'somebody else'),
+    'both': (lambda n: [currents(n, 0.5, session=2), currents(n, 0.5)], 'somebody else'),
+    'repeated': (lambda n: [currents(n - 1, 0.5)], 'after those for sample'),
+    'older': (lambda n: [currents(n - 2, 0.5)], 'after those for sample'),
+    'still to come': (lambda n: [currents(n + 2, 0.5)], 'still to come'),
+    'of another run': (
+        lambda n: [stamped_otherwise(currents(n, 0.5))],
+        'with the stamp of another measurement',
+    ),
+    'at rest, with currents': (
+        lambda n: [Currents(sequence=n, session=1, direct_current=[0.5] * 4)],
+        'says it rests',
+    ),
+    'in a state of its own': (
+        lambda n: [Currents(sequence=n, session=1, status=7, direct_current=[0.5] * 4)],
+        'with status 7',
+    ),
+}
+
+
+def stamped_otherwise(message: Currents) -> Currents:
+    set_stamp(message.header.stamp, 1_000_000_001)
+    return message
+
+
+@pytest.mark.parametrize('case', IN_FLIGHT)
+@pytest.mark.parametrize('mode', ['lockstep', 'realtime'])
+def test_what_no_controller_would_say_ends_a_flight(mode: str, case: str) -> None:
+    stage = MadeUpStage(real=True)
+    sampling, node = start(stage, mode=mode)
+
+    def say(messages: list[Currents]) -> None:
+        if mode == 'lockstep':
+            for message in messages:
+                node.answer(message)
+        else:
+            node.inbox.messages = messages
+            node.tick()
+
+    node.tick()
+    for current in (0.0, 0.5, 0.5):
+        say([currents(sampling.sequence, current)])
+    assert (stage.flying, sampling.late_samples, stage.fault) == (True, 0, None)
+    make, said = IN_FLIGHT[case]
+    say(make(sampling.sequence))
+    assert stage.fault is not None
+    assert stage.fault.kind == 'controller'
+    assert said in stage.fault.reason
+    assert stage.written == [0.0, 0.5, 0.5]
+    for _ in range(5):  # what flies on is not followed, nor when the stage has landed
+        say([currents(sampling.sequence, 0.5)])
+    assert stage.written == [0.0, 0.5, 0.5]
+    assert not stage.flying
+    assert len(node.errors) == 1
+    assert sampling.reset()[0]
+    say([currents(sampling.sequence, 0.5)])
+    say([currents(sampling.sequence, 0.0, session=2)])
+    say([currents(sampling.sequence, 0.7, session=2)])
+    assert stage.written == [0.0, 0.5, 0.5, 0.0, 0.7]
+
+
+def test_at_rest_another_controller_is_taken_up_and_its_end_is_no_fault() -> None:
+    stage = MadeUpStage(real=True)
+    sampling, node = start(stage)
+    node.answer(currents(0))
+    node.answer(Currents(sequence=0, session=1, status=Currents.GAVE_UP))
+    node.answer(currents(1, 0.4))
+    assert not sampling.controller.taken_up
+    node.answer(currents(2, session=2))
+    node.answer(currents(3, session=3))
+    node.answer(currents(4, 0.3, session=3))
+    assert stage.written == [0.0, 0.0, 0.0, 0.3]
+    assert stage.fault is None
 
 
 def test_real_time_without_a_controller_nothing_is_late() -> None:
@@ -344,6 +362,7 @@ def test_real_time_without_a_controller_nothing_is_late() -> None:
     node.inbox.messages = [currents(3)]  # it catches up with what it missed at its start
     node.tick()
     assert (sampling.answered, sampling.late_samples) == (False, 0)
+    assert not sampling.controller.taken_up
     node.inbox.messages = [currents(50)]
     node.tick()
     assert sampling.answered

@@ -26,6 +26,8 @@ from maglev_node.topics import SAMPLE_TOPICS
 ROOT = Path(__file__).resolve().parents[2]
 PARAMS = ROOT / 'params'
 
+_MATCHING = 0.3  # in which a service has seen a new client, whose answer would else be lost [s]
+
 
 def executable(package: str, name: str) -> str:
     """Path of an installed executable, which is what ``ros2 run`` runs."""
@@ -129,6 +131,8 @@ class Observer:
         self._executor.add_node(self.node)
         self._subscriptions: dict[str, PolledSubscription] = {}
         self.messages: dict[str, list[Any]] = {}
+        self._clients: dict[str, Any] = {}
+        self._heard: list[Any] = []
 
     def watch(self, *topics: str) -> None:
         """Keep the messages of these topics from now on."""
@@ -147,7 +151,7 @@ class Observer:
         messages = self.look()[topic]
         return messages[-1] if messages else None
 
-    def wait(self, condition: Callable[[], bool], timeout: float = 30.0) -> None:
+    def wait(self, condition: Callable[[], bool], timeout: float = 60.0) -> None:
         """Look until something holds."""
         deadline = time.monotonic() + timeout
         while not condition():
@@ -158,18 +162,25 @@ class Observer:
     def call(self, service: str, data: bool | None = None) -> Any:
         """Call a Trigger service, or with ``data`` a SetBool service."""
         service_type = Trigger if data is None else SetBool
-        client = self.node.create_client(service_type, service)
-        assert client.wait_for_service(timeout_sec=10.0), f'there is no {service}'
         request = service_type.Request()
         if data is not None:
             request.data = data
-        return self.ask(client, request)
+        return self.ask(self._client(service_type, service), request)
 
-    def ask(self, client: Any, request: Any) -> Any:
+    def _client(self, service_type: Any, service: str) -> Any:
+        """One for all calls of a service: a new one is not heard at once."""
+        if service not in self._clients:
+            self._clients[service] = self.node.create_client(service_type, service)
+        return self._clients[service]
+
+    def ask(self, client: Any, request: Any, timeout: float = 20.0) -> Any:
         """The answer of any service."""
-        assert client.wait_for_service(timeout_sec=10.0), f'there is no {client.srv_name}'
+        assert client.wait_for_service(timeout_sec=timeout), f'there is no {client.srv_name}'
+        if client not in self._heard:  # there for us, but are we there for it?
+            self._heard.append(client)
+            self.serve(_MATCHING)
         future = client.call_async(request)
-        self._executor.spin_until_future_complete(future, timeout_sec=10.0)
+        self._executor.spin_until_future_complete(future, timeout_sec=timeout)
         assert future.done(), f'{client.srv_name} never answered'
         return future.result()
 
@@ -179,19 +190,13 @@ class Observer:
 
     def set_parameters(self, node: str, **values: Any) -> Any:
         """Set parameters of a node all at once; ``__`` in a name stands for a dot."""
-        client = self.node.create_client(
-            SetParametersAtomically, f'/{node}/set_parameters_atomically'
-        )
-        assert client.wait_for_service(timeout_sec=10.0)
+        client = self._client(SetParametersAtomically, f'/{node}/set_parameters_atomically')
         request = SetParametersAtomically.Request()
         request.parameters = [
             Parameter(name.replace('__', '.'), value=value).to_parameter_msg()
             for name, value in values.items()
         ]
-        future = client.call_async(request)
-        self._executor.spin_until_future_complete(future, timeout_sec=20.0)
-        assert future.done(), f'{node} never answered'
-        return future.result().result
+        return self.ask(client, request).result
 
     def close(self) -> None:
         """Leave the graph."""

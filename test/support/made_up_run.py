@@ -14,10 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from maglev_model.controller_watch import Status
 from maglev_model.phases import Phase
 from maglev_monitor.bag.writer import BagWriter
 
 FORMER = {
+    'Currents': 'std_msgs/Header header\nuint64 sequence\nfloat64[4] direct_current\n'
+    'float64[4] quadrature_current\n',
     'Measurement': 'std_msgs/Header header\nuint64 sequence\nfloat64[4] gap\nfloat64 x\nfloat64 z\n'
     'uint64 late_samples\n',
     'ControllerState': 'std_msgs/Header header\nuint64 sequence\nuint8 mode\nbool saturated\n'
@@ -28,6 +31,7 @@ FORMER = {
 
 MESSAGES = Path(__file__).resolve().parents[2] / 'src' / 'maglev_msgs' / 'msg'
 RADIUS = 0.397
+SESSION = 2**63 + 1
 TOPICS = {
     'reference': ('/reference', 'maglev_msgs/msg/Reference'),
     'measurement': ('/stage/measurement', 'maglev_msgs/msg/Measurement'),
@@ -148,7 +152,11 @@ class Encoder:
                 run.late[n],
                 *(() if self._former else (run.stamp[n], self._lockstep)),
             ),
-            'currents': (run.direct[n], run.quadrature[n]),
+            'currents': (
+                run.direct[n],
+                run.quadrature[n],
+                *(() if self._former else (SESSION, int(Status.FLYING))),
+            ),
             'controller': (
                 2,
                 bool(run.saturated[n]),

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import secrets
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -69,7 +70,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         CURRENTS: 'published: the currents that answer a sample',
         CONTROLLER_STATE: 'published: mode, errors and internal models of each sample',
         '~/enable': 'std_srvs/SetBool: follow the reference; false: land',
-        '~/emergency_stop': 'std_srvs/Trigger: no current, at once',
+        '~/emergency_stop': 'std_srvs/Trigger: land, and end in a fault',
         '~/reset': 'std_srvs/Trigger: clear a fault',
     }
 
@@ -84,6 +85,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         self._reference_lost = self._reference_over = False
         self._logged = (self.supervisor.mode, self.supervisor.reason)
         self._currents, self._state = Currents(), ControllerState()
+        self._currents.session = secrets.randbits(64) | 1
         self._currents.header.frame_id = self._state.header.frame_id = 'stage'
         GraphGuard(self).claim(CURRENTS, 'controller')
         self._currents_publisher = self.create_publisher(Currents, CURRENTS, sample_qos())
@@ -95,9 +97,11 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         self._measurements = self.create_subscription(
             Measurement, MEASUREMENT, self._on_measurement, sample_qos()
         )
-        self.create_service(SetBool, '~/enable', self._on_enable)
-        self.create_service(Trigger, '~/emergency_stop', self._on_emergency_stop)
-        self.create_service(Trigger, '~/reset', self._on_reset)
+        self._by_hand = (
+            self.create_service(Trigger, '~/emergency_stop', self._on_emergency_stop),
+            self.create_service(SetBool, '~/enable', self._on_enable),
+            self.create_service(Trigger, '~/reset', self._on_reset),
+        )
         self.create_timer(_REFERENCE_PERIOD, self._take_references, clock=self.steady_clock)
         self.create_timer(_WATCH_PERIOD, self._watch, clock=self.steady_clock)
         self.take_realtime_priority()
@@ -142,7 +146,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
             self._sequence, self._pending = -1, None
             self._reference_lost = self._reference_over = False
         elif sequence - self._sequence > self._longest_gap and self.supervisor.flying:
-            self.supervisor.cut(f'{sequence - self._sequence - 1} measurements are missing')
+            self.supervisor.stop(f'{sequence - self._sequence - 1} measurements are missing')
         if self.supervisor.references.newest < sequence:
             self._take_references()
             if self._sequence == sequence:  # it was pending, and is answered
@@ -190,6 +194,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         message.sequence = sequence
         message.direct_current = self.supervisor.direct_current
         message.quadrature_current = self.supervisor.quadrature_current
+        message.status = int(self.supervisor.status)
         self._currents_publisher.publish(message)
 
     def _publish_state(self, sequence: int) -> None:
@@ -244,10 +249,8 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         return response
 
     def _on_emergency_stop(self, _request: Any, response: Any) -> Any:
-        self.supervisor.cut('emergency stop')
-        self._publish_currents(self._sequence)
+        response.success, response.message = self.supervisor.stop('emergency stop')
         self._answer_pending()
-        response.success, response.message = True, 'currents cut; call ~/reset, then ~/enable'
         return response
 
     def _on_reset(self, _request: Any, response: Any) -> Any:
@@ -278,7 +281,13 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         )
 
     def _serve_by_hand(self) -> None:
-        """What the executor does for the loop, while it waits for a callback of ours."""
+        """What the executor does for the loop and who stops it, while that is not there."""
+        for service in self._by_hand:
+            with service.handle:
+                request, header = service.handle.service_take_request(service.srv_type.Request)
+            if header is not None:
+                response = service.callback(request, service.srv_type.Response())
+                service.send_response(response, header)
         self._take_references()
         with self._measurements.handle:
             while taken := self._measurements.handle.take_message(Measurement, False):
@@ -293,10 +302,30 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
             return DiagnosticStatus.ERROR, f'{supervisor.mode.name}: {supervisor.reason}', facts
         return DiagnosticStatus.OK, supervisor.reason or supervisor.mode.name.lower(), facts
 
+    def spin(self, stop: Callable[[], bool]) -> None:
+        """Serve the graph; however that ends, in flight a landing comes before the end."""
+        try:
+            super().spin(stop)
+        except Exception as error:
+            self.supervisor.stop(f'defect: {error!r}')
+            raise
+        finally:
+            self._land_by_hand()
+
+    def _land_by_hand(self) -> None:
+        """Land, without an executor, unless the stage is silent or a landing that fails."""
+        if self.supervisor.mode == Mode.REGULATING:
+            self.supervisor.disable()
+        since = time.monotonic()
+        while self.supervisor.flying and time.monotonic() - max(since, self._answered) < _SILENCE:
+            self._answer_pending()
+            self._serve_by_hand()
+            time.sleep(_HAND_PERIOD)
+
     def close(self) -> None:
-        """The last word is zero current."""
-        self.supervisor.cut('shut down')
-        if self._sequence >= 0:
+        """In flight the last word is that the controller gives up: the stage comes down alone."""
+        if self.supervisor.flying:
+            self.supervisor.give_up('shut down')
             self._publish_currents(self._sequence)
 
 

@@ -12,6 +12,7 @@ from maglev_controller.platen_lost import PlatenWatch
 from maglev_controller.reference_buffer import ReferenceBuffer
 from maglev_controller.regulator import MeasurementFault, Regulator
 from maglev_model.axes import FloatArray
+from maglev_model.controller_watch import Status
 from maglev_model.modes import Mode
 from maglev_model.phases import Phase
 
@@ -22,10 +23,10 @@ class Supervisor:
     """Runs the regulator when it should run, and sees to it that no current flows otherwise.
 
     Without current the platen is slammed into the upper stop from anywhere above the equilibrium,
-    so while the measurement can be believed every way out of flight is a landing; only when it
-    cannot, the currents are cut at once. ``direct_current`` and ``quadrature_current`` (4,) [A]
-    hold the answer of the last :meth:`step`, ``limited_by`` what limited it, as bits of
-    :mod:`maglev_model.inverse`.
+    so while the measurement can be believed every way out of flight is a landing; when it cannot,
+    :attr:`status` says that the controller has given up, and the stage lands as it can.
+    ``direct_current`` and ``quadrature_current`` (4,) [A] hold the answer of the last :meth:`step`,
+    ``limited_by`` what limited it, as bits of :mod:`maglev_model.inverse`.
     """
 
     def __init__(self, parameters: ControllerParameters, *, enabled: bool = True) -> None:
@@ -39,9 +40,11 @@ class Supervisor:
         self.direct_current: FloatArray = np.zeros(4)
         self.quadrature_current: FloatArray = np.zeros(4)
         self._landing: Landing | None = None
+        self._after_landing = Mode.DISABLED
+        self._gave_up = False
         self._platen_watch = PlatenWatch(parameters)
         self._row = -1  # of the reference last followed
-        self._may_lift_off = enabled  # a reference in flight is not followed from its middle
+        self._may_lift_off = False  # a reference in flight is not followed from its middle
         self._segment = -1
         self._lower_stop = parameters.machine.gap_max
 
@@ -62,6 +65,13 @@ class Supervisor:
         """Whether currents flow."""
         return self.mode in (Mode.REGULATING, Mode.LANDING)
 
+    @property
+    def status(self) -> Status:
+        """What the stage is to know of the controller, with the currents."""
+        if self._gave_up:
+            return Status.GAVE_UP
+        return Status.FLYING if self.flying else Status.RESTING
+
     def redesign(self, parameters: ControllerParameters) -> DesignProcess:
         """Begin to design a regulator for new parameters, to :meth:`adopt` between two steps.
 
@@ -72,8 +82,12 @@ class Supervisor:
         return DesignProcess(self.regulator, parameters)
 
     def adopt(self, regulator: Regulator, maps: ModelMaps) -> None:
-        """Go on with another regulator, in flight without a jump of its output."""
+        """Go on with another regulator, in flight without a jump of its output.
+
+        Raises ParameterError when it flies by now and that cannot change in flight.
+        """
         if self.flying:
+            check_retuning(self.parameters, regulator.parameters)
             regulator.take_over(self.regulator, maps)
         self.regulator, self.parameters = regulator, regulator.parameters
         self._platen_watch = PlatenWatch(regulator.parameters)
@@ -93,29 +107,46 @@ class Supervisor:
     def disable(self) -> tuple[bool, str]:
         """End with no current: after a landing when the platen flies."""
         if self.flying:
-            self._land('disabled')
+            if self.mode == Mode.REGULATING:
+                self._land('disabled')
             return True, 'landing first, then the currents end'
         if self.mode != Mode.FAULT:
             self.mode, self.reason = Mode.DISABLED, 'disabled'
         return True, 'disabled'
 
-    def cut(self, reason: str) -> None:
-        """No current from now on, until :meth:`reset_fault`."""
+    def stop(self, reason: str) -> tuple[bool, str]:
+        """End in a fault: after a landing when the platen flies."""
+        if self.mode == Mode.REGULATING:
+            self._land(reason)
+        if self.mode == Mode.LANDING:
+            self.reason, self._after_landing = reason, Mode.FAULT
+            return True, 'landing; then call ~/reset, then ~/enable'
+        if self.mode != Mode.FAULT:
+            self.mode, self.reason = Mode.FAULT, reason
+        return True, 'no current flows; call ~/reset, then ~/enable'
+
+    def give_up(self, reason: str) -> None:
+        """End in a fault at once: what flies is the stage's to bring down."""
+        self._gave_up = self._gave_up or self.flying
         self.mode, self.reason = Mode.FAULT, reason
         self._no_current()
 
     def reset_fault(self) -> tuple[bool, str]:
         """Clear a latched fault; the controller is then disabled."""
         if self.mode != Mode.FAULT:
-            return False, 'there is no fault'
+            still = self.mode == Mode.LANDING and self._after_landing == Mode.FAULT
+            return False, f'{self.reason}: still landing' if still else 'there is no fault'
         cleared, self.mode, self.reason = self.reason, Mode.DISABLED, 'reset, not enabled'
+        self._gave_up = False
         return True, f'cleared: {cleared}'
 
     def restart(self) -> None:
         """The stage began anew: what was known of it, and of its reference, is void."""
         self.references.stage_began_anew()
         if self.flying:
-            self.mode, self.reason = Mode.WAITING, ''
+            ended = self.mode == Mode.LANDING and self._after_landing == Mode.FAULT
+            self.mode = Mode.FAULT if ended else Mode.WAITING
+            self.reason = self.reason if ended else ''
             self._may_lift_off = False
         self._no_current()
 
@@ -180,7 +211,7 @@ class Supervisor:
 
     def _land(self, reason: str) -> None:
         references, row = self.references, self._row
-        self.mode, self.reason = Mode.LANDING, reason
+        self.mode, self.reason, self._after_landing = Mode.LANDING, reason, Mode.DISABLED
         self._landing = Landing(
             self.parameters,
             references.position[row],
@@ -192,7 +223,7 @@ class Supervisor:
         assert self._landing is not None
         position, velocity, acceleration = self._landing.step()
         if self._landing.done:
-            self.mode, self.reason = Mode.DISABLED, f'landed: {self.reason}'
+            self.mode, self.reason = self._after_landing, f'landed: {self.reason}'
             self._no_current()
         else:
             self._regulate(gap, x, z, position, velocity, acceleration)
@@ -218,7 +249,7 @@ class Supervisor:
                 self.quadrature_current,
             )
         except MeasurementFault as fault:
-            self.cut(str(fault))
+            self.give_up(str(fault))
 
     def _no_current(self) -> None:
         self.direct_current[:] = 0.0

@@ -63,6 +63,12 @@ def stale_fault(age: float) -> tuple[str, str]:
     return f'no fresh currents for {age * 1e3:.0f} ms', 'start the controller again'
 
 
+def zero_fault(watched: Guard) -> tuple[str, str]:
+    """Reason and remedy of zero currents in flight."""
+    height = watched.arrays.position[0]
+    return f'zero currents were commanded at y = {height * 1e3:.2f} mm', 'see to the controller'
+
+
 def overrun_fault(late: float) -> tuple[str, str]:
     """Reason and remedy of a sample that was read so late [s]."""
     return f'a sample was read {late * 1e3:.1f} ms late', 'free the machine of other load'

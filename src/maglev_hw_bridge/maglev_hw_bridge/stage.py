@@ -23,11 +23,19 @@ from maglev_hw_bridge.encoders import Encoders, HomingError
 from maglev_hw_bridge.guard import Guard
 from maglev_hw_bridge.landing import Landing
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_model.stage import EncoderSample, Fault, StageError, Truth, motor_currents
+from maglev_model.stage import (
+    STOP_REMEDY,
+    EncoderSample,
+    Fault,
+    StageError,
+    Truth,
+    motor_currents,
+)
 
 FloatArray = NDArray[np.float64]
 
-_ON_THE_STOP = 2e-4  # this near the lower stop the platen rests [m]
+_ON_THE_STOP = 2e-4  # this near the lower stop the platen rests [m],
+_AT_REST = 0.02  # when it is slower than this [m/s]
 
 
 class Mode(enum.Enum):
@@ -75,7 +83,7 @@ class BridgeStage:
         self._zero = np.zeros(4)
         self._direct, self._quadrature = np.zeros(4), np.zeros(4)
         self.flying = False  # current flows
-        self._age = 0  # samples since the last fresh currents
+        self._age = 0  # of the last fresh currents, in samples since what they answer
         self._lower_stop = self.parameters.machine.gap_max
         self._stale_samples = round(self.parameters.fault.stale / self.parameters.sample_time)
         self._warm_up()
@@ -209,15 +217,15 @@ class BridgeStage:
             self._late()
         return EncoderSample(length[:4].copy(), length.item(4), length.item(5))
 
-    def write(self, direct_current: Any, quadrature_current: Any) -> None:
-        """Currents of motors 1..4 [A], (4,) each, fresh from the controller.
+    def write(self, direct_current: Any, quadrature_current: Any, age: int = 0) -> None:
+        """Currents of motors 1..4 [A], (4,) each, for the sample ``age`` before the last one read.
 
         Raises ValueError when a shape is wrong or a current is not finite or too large (the bridge
         then lands), StageError when the boards are lost.
         """
         i_d = motor_currents('direct_current', direct_current)
         i_q = motor_currents('quadrature_current', quadrature_current)
-        self._age = 0
+        self._age = age
         refused = ''
         if self.mode is Mode.FOLLOWING:
             refused = self._follow(i_d, i_q)
@@ -231,25 +239,35 @@ class BridgeStage:
         """No fresh currents for this sample: the last ones stay, for a while. Raises StageError."""
         self._age += 1
         if self.mode is Mode.FOLLOWING:
-            if self.flying and self._age >= self._stale_samples:
-                self._raise_fault('stale', *faults.stale_fault(self._age * self.sample_time))
-            else:
-                self._follow(self._direct, self._quadrature)
+            self._follow(self._direct, self._quadrature)
         self._put_out()
 
     def _follow(self, i_d: FloatArray, i_q: FloatArray) -> str:
-        """Drive the amplifiers as commanded; returns why a command was refused."""
+        """Drive the amplifiers as commanded, unless that is a fault; why a command was refused."""
+        flows = bool(np.any(i_d) or np.any(i_q))
+        if (flows or self.flying) and self._age >= self._stale_samples:
+            self._raise_fault('stale', *faults.stale_fault(self._age * self.sample_time))
+            return ''
+        if self.flying and not flows and not self._on_the_stop():
+            self._raise_fault('controller', *faults.zero_fault(self.guard))
+            return ''
         x, z = self.guard.arrays.believed[4], self.guard.arrays.believed[5]
         code, index = self.amplifiers.drive(i_d, i_q, x, z)
         if code in (amplifiers.FINE, amplifiers.SPENT):
             self._direct[:], self._quadrature[:] = i_d, i_q
             self.guard.arrays.i_q[:] = i_q
-            self.flying = bool(np.any(i_d) or np.any(i_q))
+            self.flying = flows
         if code == amplifiers.FINE:
             return ''
         reason, remedy = faults.command_fault(code, index, i_d, i_q, self.amplifiers)
         self._raise_fault('current', reason, remedy)
         return '' if code == amplifiers.SPENT else reason
+
+    def _on_the_stop(self) -> bool:
+        """Whether the platen rests on its lower stop."""
+        state = self.guard.arrays
+        resting = state.position[0] > self._lower_stop - _ON_THE_STOP
+        return bool(resting and abs(state.rate[0]) < _AT_REST)
 
     def _put_out(self) -> None:
         if self.mode is Mode.LANDING:
@@ -282,9 +300,11 @@ class BridgeStage:
             self.why = why
             self._begin_landing()
 
-    def stop(self, why: str = 'emergency stop') -> None:
+    def stop(
+        self, why: str = 'emergency stop', *, kind: str = 'stop', remedy: str = STOP_REMEDY
+    ) -> None:
         """Latch a fault with that reason; lands while everything needed for that is sound."""
-        self._raise_fault('stop', why, 'see to what made it necessary')
+        self._raise_fault(kind, why, remedy)
 
     def resume(self) -> None:
         """Follow the controller again after a landing without a fault."""
@@ -346,8 +366,7 @@ class BridgeStage:
 
     def _begin_landing(self) -> None:
         state = self.guard.arrays
-        resting = state.position[0] > self._lower_stop - _ON_THE_STOP
-        if not self.flying or (resting and abs(state.rate[0]) < 0.02):
+        if not self.flying or self._on_the_stop():
             self._disable()
             return
         self.mode = Mode.LANDING

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
+STOP_REMEDY = 'see to what made it necessary'
+
 
 class EncoderSample(NamedTuple):
     """What the six encoders read at one sample."""
@@ -94,18 +96,22 @@ class Stage(Protocol):
         """The next sample's encoders. Raises StageError."""
         ...
 
-    def write(self, direct_current: FloatArray, quadrature_current: FloatArray) -> None:
+    def write(
+        self, direct_current: FloatArray, quadrature_current: FloatArray, age: int = 0
+    ) -> None:
         """Follow i_d and i_q of motors 1..4 [A], (4,) each, fresh from the controller.
 
-        Raises ValueError for currents that have another shape or are not finite, which are not
-        followed, and StageError.
+        They answer the measurement that was read ``age`` samples before the last one. Too old ones
+        are not followed but a fault, as when none come; so are, on a stage that can land by itself,
+        currents that are all zero while the platen is off its stop. Raises ValueError for currents
+        that have another shape or are not finite, which are not followed, and StageError.
         """
         ...
 
     def hold(self) -> None:
         """No fresh currents came for this sample: the last ones stay, for a while.
 
-        In flight that is a fault when it lasts too long. Raises StageError.
+        In flight that is a fault when they get too old. Raises StageError.
         """
         ...
 
@@ -113,7 +119,9 @@ class Stage(Protocol):
         """Come down without a controller and follow no currents until :meth:`reset`."""
         ...
 
-    def stop(self, why: str = 'emergency stop') -> None:
+    def stop(
+        self, why: str = 'emergency stop', *, kind: str = 'stop', remedy: str = STOP_REMEDY
+    ) -> None:
         """Latch a fault with that reason, and land or cut the currents, as the stage can."""
         ...
 

@@ -57,17 +57,23 @@ class SamplePublisher:
         message.wall_time = time.time_ns()
         if self._first is None:
             self._first = sequence, message.wall_time
-        since = sequence - self._first[0]
-        set_stamp(message.header.stamp, self._first[1] + since * self._period)
+        set_stamp(message.header.stamp, self.stage_time(sequence))
         message.sequence = sequence
         message.gap, message.x, message.z = sample
         message.late_samples = late_samples
         self._publisher.publish(message)
         if truth is not None and self._true_publisher is not None:
             self._publish_truth(truth)
+        since = sequence - self._first[0]
         if self._clock_publisher is not None and since % _CLOCK_SAMPLES == 0:
             copy_stamp(message.header.stamp, self._clock.clock)
             self._clock_publisher.publish(self._clock)
+
+    def stage_time(self, sequence: int) -> int:
+        """The stamp of a sample [ns since the epoch]; 0 before the first was published."""
+        if self._first is None:
+            return 0
+        return self._first[1] + (sequence - self._first[0]) * self._period
 
     def watched(self) -> bool:
         """Whether all who shall see every sample are there; now and then says who is not."""

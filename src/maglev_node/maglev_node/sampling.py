@@ -6,8 +6,7 @@ import time
 from itertools import count
 from typing import Any, Generic, TypeVar
 
-import numpy as np
-
+from maglev_model.controller_watch import ControllerWatch, Verdict
 from maglev_model.stage import EncoderSample, Fault, Stage, StageError
 from maglev_msgs.msg import Currents
 from maglev_node.managed_node import ManagedNode
@@ -15,10 +14,13 @@ from maglev_node.pacing import Deadlines, Pace, StageClock
 from maglev_node.polling import PolledSubscription
 from maglev_node.sample_publisher import SamplePublisher
 from maglev_node.stage_parameters import ClockedStageParameters, StageNodeParameters
+from maglev_node.stamp import nanoseconds
 from maglev_node.topics import CURRENTS, sample_qos
 
 _REPEAT_PERIOD = 0.02
 """How often lockstep looks whether an answer is overdue, and repeats the first sample [s]."""
+
+_REMEDY = 'see to the controller, and that it is the only one'
 
 P = TypeVar('P', bound=StageNodeParameters)
 S = TypeVar('S', bound=Stage)
@@ -29,9 +31,9 @@ class Sampling(Generic[P, S]):
 
     Lockstep: the first sample is repeated until a controller answers it; from then on each sample
     waits for the currents with its sequence number. Real time: a sample every sample time, with the
-    newest currents, hence one sample of delay. Currents are followed only once they have been zero
-    since the start, or since a fault was reset: a controller that went on flying meanwhile would
-    throw the platen off its stop.
+    newest currents, hence one sample of delay. Whose currents are followed, and from when on, is
+    for the :class:`~maglev_model.controller_watch.ControllerWatch` to say; what it refuses in
+    flight is a fault of the stage.
     """
 
     def __init__(self, node: ManagedNode[P], stage: S) -> None:
@@ -39,15 +41,14 @@ class Sampling(Generic[P, S]):
         self.sequence = node.parameters.first_sequence - 1
         self.late_samples = 0
         self.answered = False  # by a controller, since the start
-        self.armed = False  # currents are followed
+        self.controller = ControllerWatch()
         self._node = node
         self._lost = False  # the stage cannot go on
         self._reported: Fault | None = None
         self._sample: EncoderSample | None = None
         self._sample_time = 0.0  # when it was taken
         self._timer: Any = None
-        self._direct = self._quadrature = np.zeros(4)
-        self._newest = self._applied = -1  # sequence of the currents that came, were followed last
+        self._newest = -1  # sequence of the newest currents that came
         self._publisher = SamplePublisher(node, stage.sample_time, truth=stage.truth() is not None)
         self._answers: Any = None
         self._pace: Pace = StageClock(stage.sample_time)
@@ -63,8 +64,9 @@ class Sampling(Generic[P, S]):
     def start(self) -> None:
         """Activate the stage and take the first sample. Raises StageError."""
         self.stage.activate()
-        self.answered = self.armed = self._lost = False
-        self._newest = self._applied = -1
+        self.answered = self._lost = False
+        self.controller.forget()
+        self._newest = -1
         self._sample = self.stage.read()
         self.sequence += 1
         self._sample_time = time.monotonic()
@@ -115,7 +117,7 @@ class Sampling(Generic[P, S]):
         success, message = self.stage.reset()
         self._report()
         if success:
-            self.armed = False
+            self.controller.forget()
             lost, self._lost = self._lost, False
             if lost and self._timer is not None:
                 self.answered = False
@@ -130,13 +132,19 @@ class Sampling(Generic[P, S]):
     # -- lockstep ----------------------------------------------------------------------------------
 
     def _on_answer(self, message: Currents) -> None:
-        if message.sequence != self.sequence or self._timer is None:
+        if self._timer is None or not (self.answered or self._publisher.watched()):
             return
-        if not (self.answered or self._publisher.watched()):
-            return
-        self.answered = True
-        self._apply(message.direct_current, message.quadrature_current)
-        self._advance()
+        verdict = self._judge(message)
+        if message.sequence == self.sequence:
+            self.answered = True
+            if verdict is Verdict.FOLLOWED:
+                self._write(message)
+            else:
+                self._hold()
+            self._advance()
+        if verdict is Verdict.REFUSED and self.controller.gave_up:  # it may not answer any more
+            self._go_on_alone()
+            self.answered = not self.stage.restartable
 
     def _watch_answers(self) -> None:
         if self._lost:
@@ -190,23 +198,24 @@ class Sampling(Generic[P, S]):
     def _take_sample(self) -> None:
         """One sample, and the newest currents that have arrived by then."""
         self._advance()
-        self._take_currents()
+        fresh = self._take_currents()
         if self.answered and self._newest < self.sequence - 1:
             self.late_samples += 1
-        if self._newest != self._applied:
-            self._applied = self._newest
-            self._apply(self._direct, self._quadrature)
-        else:
+        if fresh is None:
             self._hold()
+        else:
+            self._write(fresh)
 
-    def _take_currents(self) -> None:
-        """Called at the tick, so that none come too late."""
+    def _take_currents(self) -> Currents | None:
+        """The newest that are followed, if any; called at the tick, so that none come too late."""
+        fresh = None
         for message, _ in self._currents.take():
             self._newest = message.sequence
-            self._direct = message.direct_current
-            self._quadrature = message.quadrature_current
             # A controller that catches up with what it missed at its start is not late.
             self.answered |= message.sequence >= self.sequence - 2
+            if self._judge(message) is Verdict.FOLLOWED:
+                fresh = message
+        return fresh
 
     # -- both --------------------------------------------------------------------------------------
 
@@ -229,26 +238,37 @@ class Sampling(Generic[P, S]):
             truth = self.stage.truth()
             self._publisher.publish(self.sequence, self._sample, self.late_samples, truth)
 
-    def _apply(self, direct_current: Any, quadrature_current: Any) -> None:
-        """Let the stage follow fresh currents, if they are followed yet."""
-        if not self._heeds(direct_current, quadrature_current):
-            self._hold()
-        elif not self._lost:
-            try:
-                self.stage.write(direct_current, quadrature_current)
-            except StageError as error:
-                self._lose(error)
-            except ValueError as error:
-                if self.stage.fault is None:
-                    self.stage.stop(str(error))
+    def _judge(self, message: Currents) -> Verdict:
+        """What becomes of a command; one that is refused is a fault."""
+        sequence, controller = message.sequence, self.controller
+        verdict = controller.judge(
+            message.session,
+            sequence,
+            message.status,
+            message.direct_current,
+            message.quadrature_current,
+            stamped=nanoseconds(message.header.stamp) == self._publisher.stage_time(sequence),
+            sample=self.sequence,
+            flying=self.stage.flying,
+        )
+        if verdict is Verdict.REFUSED and self.stage.fault is None:
+            self.stage.stop(controller.why, kind='controller', remedy=_REMEDY)
             self._report()
+        return verdict
 
-    def _heeds(self, direct_current: Any, quadrature_current: Any) -> bool:
-        """Whether currents are followed: from when they have been zero, see the class."""
-        if not self.armed:
-            flowing = np.any(direct_current) or np.any(quadrature_current)
-            self.armed = self.answered and not flowing
-        return self.armed
+    def _write(self, message: Currents) -> None:
+        """Let the stage follow fresh currents."""
+        if self._lost:
+            return
+        age = self.sequence - message.sequence
+        try:
+            self.stage.write(message.direct_current, message.quadrature_current, age)
+        except StageError as error:
+            self._lose(error)
+        except ValueError as error:
+            if self.stage.fault is None:
+                self.stage.stop(str(error), kind='controller', remedy=_REMEDY)
+        self._report()
 
     def _hold(self) -> None:
         """No currents to follow for this sample."""

@@ -158,12 +158,9 @@ class StageNode(ManagedNode[P], Generic[P, S]):
             return DiagnosticStatus.OK, self.state, facts
         if not sampling.answered:
             return DiagnosticStatus.WARN, f'waiting for {sampling.awaited()}', facts
-        if not sampling.armed:
-            return (
-                DiagnosticStatus.WARN,
-                'no current until the controller has commanded none',
-                facts,
-            )
+        if not sampling.controller.taken_up:
+            why = sampling.controller.why or 'no current flows until the controller commands none'
+            return DiagnosticStatus.WARN, why, facts
         if sampling.late_samples:
             return DiagnosticStatus.WARN, 'some currents came late', facts
         return DiagnosticStatus.OK, 'running', facts

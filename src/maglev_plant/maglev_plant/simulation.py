@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
 from maglev_model.records import Block
-from maglev_model.stage import EncoderSample, Fault, Truth, motor_currents
+from maglev_model.stage import STOP_REMEDY, EncoderSample, Fault, Truth, motor_currents
 from maglev_plant.arrays import StageArrays, stage_arrays
 from maglev_plant.dynamics import advance
 from maglev_plant.encoder import encode
@@ -136,24 +136,30 @@ class SimulatedStage:
         self._first = False
         return EncoderSample(reading[:4], reading.item(4), reading.item(5))
 
-    def write(self, direct_current: ArrayLike, quadrature_current: ArrayLike) -> None:
+    def write(self, direct_current: ArrayLike, quadrature_current: ArrayLike, age: int = 0) -> None:
         """Hold these currents until the next write; none while a fault is latched or it has landed.
 
-        ``direct_current`` i_d, ``quadrature_current`` i_q of motors 1..4 [A], shape (4,) each.
-        Raises ValueError, and holds what was written before, when a shape is wrong or a current is
-        not finite.
+        ``direct_current`` i_d, ``quadrature_current`` i_q of motors 1..4 [A], shape (4,) each, for
+        the sample ``age`` before this one: a fault in flight when that is beyond the watchdog. Zero
+        currents in flight are obeyed, as it has no law to land by. Raises ValueError, and holds
+        what was written before, when a shape is wrong or a current is not finite.
         """
         i_d = motor_currents(_DIRECT, direct_current)
         i_q = motor_currents(_QUADRATURE, quadrature_current)
         if not _hold(i_d, i_q, self._arrays.command):
             raise ValueError(_not_finite(i_d, i_q))
-        self._age = 0
+        self._age = age
         if self._landed or self.fault is not None:
             self.deactivate()
+        elif age:
+            self._watch_age()
 
     def hold(self) -> None:
         """No fresh currents for this sample; a fault when they are older than the watchdog."""
         self._age += 1
+        self._watch_age()
+
+    def _watch_age(self) -> None:
         age = self._age * self.sample_time
         if age > self.watchdog and self.flying:
             self._latch(
@@ -165,9 +171,11 @@ class SimulatedStage:
         self._landed = True
         self.deactivate()
 
-    def stop(self, why: str = 'emergency stop') -> None:
+    def stop(
+        self, why: str = 'emergency stop', *, kind: str = 'stop', remedy: str = STOP_REMEDY
+    ) -> None:
         """Cut the currents and latch a fault with that reason."""
-        self._latch('stop', why, 'see to what made it necessary')
+        self._latch(kind, why, remedy)
 
     def reset(self) -> tuple[bool, str]:
         """Clear the latched fault and follow currents again; whether there was need to."""

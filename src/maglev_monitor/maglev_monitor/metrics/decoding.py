@@ -74,6 +74,8 @@ TOPIC_TYPES = {
                 Field('sequence', '<u8'),
                 Field('direct_current', '<f8', 4),
                 Field('quadrature_current', '<f8', 4),
+                Field('session', '<u8', added=True),
+                Field('status', '<u1', added=True),
             ),
         ),
         TopicType(

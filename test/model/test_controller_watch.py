@@ -1,0 +1,141 @@
+"""Whose currents a stage follows, whatever comes in whatever order."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from maglev_model.controller_watch import NOBODY, ControllerWatch, Status, Verdict
+
+ZERO = np.zeros(4)
+ONE = np.ones(4)
+
+
+class Message(NamedTuple):
+    """What reaches a stage, beside time passing."""
+
+    session: int = 1
+    age: int = 0  # samples since what it answers; negative: still to come
+    status: int = Status.FLYING
+    current: float = 1.0
+    stamped: bool = True
+
+
+class Flight:
+    """A stage that flies with what it follows, and lands by itself from what is refused."""
+
+    def __init__(self) -> None:
+        self.watch = ControllerWatch()
+        self.sample = 10
+        self.flying = False
+        self.followed: list[tuple[int, int]] = []  # session and sequence number, this flight
+        self.ended = ''
+
+    def hear(self, message: Message) -> Verdict:
+        """Judge a message and act accordingly."""
+        verdict = self.watch.judge(
+            message.session,
+            self.sample - message.age,
+            message.status,
+            message.current * ONE,
+            ZERO,
+            stamped=message.stamped,
+            sample=self.sample,
+            flying=self.flying,
+        )
+        if verdict is Verdict.FOLLOWED:
+            self.flying = message.current != 0.0
+            self.followed.append((message.session, self.sample - message.age))
+        elif verdict is Verdict.REFUSED:
+            self.ended = self.watch.why
+        return verdict
+
+    def land(self) -> None:
+        """Come to rest."""
+        self.flying, self.ended = False, ''
+
+
+REST = Message(status=Status.RESTING, current=0.0)
+messages = st.builds(
+    Message,
+    session=st.sampled_from([NOBODY, 1, 2]),
+    age=st.integers(-2, 4),
+    status=st.sampled_from([*Status, 7]),
+    current=st.sampled_from([0.0, 1.0, np.nan]),
+    stamped=st.booleans(),
+)
+
+
+@given(st.lists(st.one_of(messages, st.just('sample'), st.just('at rest')), max_size=60))
+def test_in_flight_one_controller_in_order_or_none(events: list[Message | str]) -> None:
+    flight = Flight()
+    for event in events:
+        if event == 'at rest':
+            flight.land()
+        elif event == 'sample':
+            flight.sample += 1
+        elif isinstance(event, Message):
+            before, flown = flight.flying, flight.watch.session
+            verdict = flight.hear(event)
+            if verdict is Verdict.FOLLOWED:
+                assert flight.watch.session == event.session != NOBODY
+                assert event.stamped
+                assert event.age >= 0
+                rests = event.status == Status.RESTING and event.current == 0.0
+                assert rests or event.status == Status.FLYING
+                assert rests or event.session == flown  # taken up from zero currents only
+                assert not before or event.session == flown
+                own = [number for session, number in flight.followed if session == event.session]
+                assert own[-1] == max(own)
+            elif before:
+                assert not flight.watch.taken_up  # whatever comes, it lands
+                assert flight.ended
+            if before and flown == NOBODY:
+                assert verdict is Verdict.IGNORED
+    assert not flight.ended or flight.flying
+
+
+@given(st.lists(messages, max_size=8))
+def test_a_controller_that_works_is_always_taken_up(strange: list[Message]) -> None:
+    flight = Flight()
+    for message in strange:
+        flight.hear(message)
+    flight.land()
+    flight.sample += 10
+    assert flight.hear(REST) is Verdict.FOLLOWED
+    for _ in range(100):
+        flight.sample += 1
+        assert flight.hear(Message()) is Verdict.FOLLOWED
+    assert flight.flying
+
+
+def test_taken_up_at_rest_with_a_prompt_answer() -> None:
+    flight = Flight()
+    for age, verdict in ((3, Verdict.IGNORED), (2, Verdict.FOLLOWED)):
+        assert flight.hear(REST._replace(age=age)) is verdict
+    flight.sample += 5
+    for message, why in (
+        (REST._replace(session=2, age=3), '3 samples late'),
+        (REST._replace(session=NOBODY), 'without a session'),
+        (Message(session=2), 'until the controller has commanded none'),
+        (REST._replace(session=2, stamped=False), 'stamp'),
+        (REST._replace(age=-1), 'still to come'),
+        (Message(status=Status.RESTING), 'says it rests'),
+    ):
+        assert flight.hear(message) is Verdict.IGNORED
+        assert why in flight.watch.why
+    assert flight.watch.session == 1
+
+
+def test_who_gives_up_at_rest_has_to_be_taken_up_again() -> None:
+    flight = Flight()
+    flight.hear(REST)
+    flight.sample += 1
+    assert flight.hear(Message(session=2, status=Status.GAVE_UP)) is Verdict.IGNORED
+    assert (flight.watch.taken_up, flight.watch.gave_up) == (True, False)
+    assert flight.hear(Message(status=Status.GAVE_UP, age=1)) is Verdict.IGNORED
+    assert (flight.watch.taken_up, flight.watch.gave_up) == (False, True)
+    assert flight.hear(Message()) is Verdict.IGNORED

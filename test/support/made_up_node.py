@@ -1,0 +1,100 @@
+"""A node that only notes what sampling asks of it, and speaks when a test does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from types import SimpleNamespace
+from typing import Any
+
+from rosgraph_msgs.msg import Clock
+
+from maglev_msgs.msg import Measurement
+from maglev_node.stage_parameters import ClockedStageParameters
+from maglev_node.stamp import nanoseconds, set_stamp
+
+
+class Topic:
+    """A publisher; messages are noted by what tells them apart."""
+
+    def __init__(self) -> None:
+        self.sequences: list[int] = []
+        self.newest: Any = None
+        self.stamps: list[int] = []
+        self.stamp_of: dict[int, int] = {}
+
+    def publish(self, message: Any) -> None:
+        if isinstance(message, Clock):
+            self.stamps.append(nanoseconds(message.clock))
+            return
+        self.sequences.append(message.sequence)
+        self.stamps.append(nanoseconds(message.header.stamp))
+        self.stamp_of[message.sequence] = self.stamps[-1]
+        self.newest = message
+
+
+class Inbox:
+    """The queue of currents in real time."""
+
+    def __init__(self, stamped: Callable[[Any], Any]) -> None:
+        self.messages: list[Any] = []
+        self._stamped = stamped
+
+    def take(self) -> Iterator[tuple[Any, int]]:
+        waiting, self.messages = self.messages, []
+        return ((self._stamped(message), 0) for message in waiting)
+
+
+class MadeUpNode:
+    """What sampling asks of a node."""
+
+    steady_clock = None
+
+    def __init__(self, **parameters: Any) -> None:
+        self.parameters = ClockedStageParameters(**parameters)
+        self.topics: dict[type, Topic] = {}
+        self.errors: list[str] = []
+        self.failed: list[str] = []
+        self.timers: list[Any] = []
+        self.fail = self.failed.append
+        self.inbox = Inbox(self.stamped)
+        self.subscribers: dict[str, list[str]] = {}
+
+    def get_namespace(self) -> str:
+        return '/'
+
+    def get_subscriptions_info_by_topic(self, topic: str) -> list[Any]:
+        names = self.subscribers.get(topic, [])
+        return [SimpleNamespace(node_name=name, node_namespace='/') for name in names]
+
+    def create_publisher(self, message_type: type, _topic: str, _qos: Any) -> Topic:
+        return self.topics.setdefault(message_type, Topic())
+
+    def create_subscription(self, _type: type, _topic: str, callback: Any, _qos: Any) -> Any:
+        self.answer = lambda message: callback(self.stamped(message))
+        return SimpleNamespace(topic_name='/stage/currents', get_publisher_count=lambda: 0)
+
+    def poll(self, _topic: str, _type: type) -> Inbox:
+        return self.inbox
+
+    def create_timer(self, period: float, action: Any, clock: Any) -> Any:
+        self.tick = action
+        timer = SimpleNamespace(period=period, timer_period_ns=0, reset=lambda: None)
+        self.timers.append(timer)
+        return timer
+
+    def destroy_timer(self, timer: Any) -> None:
+        self.timers.remove(timer)
+
+    def get_logger(self) -> Any:
+        return SimpleNamespace(error=self.errors.append)
+
+    def stamped(self, message: Any) -> Any:
+        """A message with the stamp of its measurement, unless it has one already."""
+        if Measurement in self.topics and not nanoseconds(message.header.stamp):
+            stamps = self.topics[Measurement].stamp_of
+            set_stamp(message.header.stamp, stamps.get(message.sequence, 0))
+        return message
+
+    @property
+    def measured(self) -> list[int]:
+        return self.topics[Measurement].sequences
