@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from maglev_hw_bridge.amplifiers import FINE, NOT_FINITE, OVER_CURRENT, OVER_LIMIT, Amplifiers
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_model.parameters import build
+from maglev_model.parameters import ParameterError, build
 
 TAU = 0.05715
 OFFSET = (0.1, -0.2, 0.3, 1.0)
@@ -65,7 +65,8 @@ def test_volts_to_currents_to_dq_and_back(
 @given(commands=st.lists(st.tuples(FOUR, FOUR), min_size=1, max_size=6), x=PLACE, z=PLACE)
 def test_nothing_leaves_its_limits(commands: list, x: float, z: float) -> None:
     slew = 2000.0
-    unit = amplifiers(amplifier__slew=slew, amplifier__voltage_range=3.0)
+    unit = amplifiers(amplifier__slew=slew)
+    unit.arrays.voltage_range = 3.0  # which parameters refuse: less than the peak
     last = np.zeros(12)
     for i_d, i_q in commands:
         unit.drive(2.0 * i_d, 1.5 * i_q, x, z)
@@ -113,3 +114,25 @@ def test_the_load_follows_the_square_of_the_current(current: float) -> None:
     for _ in range(1000):
         unit.drive(zero, zero, 0.0, 0.0)
     assert unit.load == pytest.approx(expected * math.exp(-1.0 / 2.0), rel=1e-9)
+
+
+@pytest.mark.parametrize('phase', [0, 11])
+def test_outputs_that_cannot_ask_for_the_peak_are_refused(phase: int) -> None:
+    gain, offset = [1.0] * 12, [0.0] * 12
+    offset[phase] = -0.5
+    gain[phase] = 7.0 / 9.5 + 1e-9
+    amplifiers(amplifier__gain=gain, amplifier__offset=offset)
+    gain[phase] -= 1e-6
+    with pytest.raises(ParameterError, match=rf'amplifier\.gain\[{phase}\].*peak_current'):
+        amplifiers(amplifier__gain=gain, amplifier__offset=offset)
+
+
+def test_cut_makes_no_current_at_once() -> None:
+    unit = Amplifiers(build(BridgeParameters, {**WIRED, 'amplifier.slew': 1000.0}))
+    for _ in range(5):
+        unit.drive(np.full(4, 3.0), np.zeros(4), 0.0, 0.0)
+    assert np.any(unit.arrays.current)
+    assert unit.cut().tolist() == list(ZERO)
+    assert not np.any(unit.arrays.current)
+    unit.drive(np.zeros(4), np.zeros(4), 0.0, 0.0)  # and there is no slope left to go down
+    assert unit.volts.tolist() == list(ZERO)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
+from collections.abc import Callable
 
 import numpy as np
 import pytest
-from hil_check import CallError, Module
+from hil_check import CallError, Module, Trouble
 
+from maglev_hw_bridge.doubts import doubts
 from maglev_hw_bridge.drivers import DriverError, WatchdogError, make_driver
 from maglev_hw_bridge.drivers.quanser import QuanserDriver
 from maglev_hw_bridge.parameters import BridgeParameters
@@ -19,7 +22,7 @@ COUNTS = np.arange(8, dtype=np.int32) * 100 - 300
 
 def driver_on(module: Module, **overrides: object) -> QuanserDriver:
     names = {name.replace('__', '.'): value for name, value in overrides.items()}
-    return QuanserDriver(build(BridgeParameters, names), module, lambda: 0.0)
+    return QuanserDriver(build(BridgeParameters, names), module, lambda: 0.0, module.sleep)
 
 
 def run(driver: QuanserDriver, samples: int = 5) -> np.ndarray:
@@ -71,7 +74,7 @@ def test_closing_in_flight_leaves_nothing_behind() -> None:
         assert not card.open
         assert not np.any(card.volts[:6])
         assert not card.watchdog
-    with pytest.raises(AttributeError):
+    with pytest.raises(DriverError):
         driver.read(np.zeros(6, dtype=np.int32))
 
 
@@ -119,36 +122,268 @@ def test_a_watchdog_left_expired_by_a_crash_is_cleared_first() -> None:
     driver.close()
 
 
-@pytest.mark.parametrize(
-    'call',
-    ['HIL', 'set_analog_output_ranges', 'write_analog', 'watchdog_start', 'task_start',
-     'task_create_encoder_reader', 'task_read_encoder', 'watchdog_reload', 'task_stop'],
+LINES = {'boards__stop_input': 3, 'boards__enable_output': 5}
+OFFSET = 0.25
+CALLS = (
+    'HIL', 'watchdog_is_expired', 'set_analog_output_ranges', 'write_analog', 'read_encoder',
+    'set_digital_directions', 'read_digital', 'write_digital', 'task_create_encoder_reader',
+    'task_start', 'task_read_encoder', 'task_stop', 'task_delete', 'watchdog_start',
+    'watchdog_set_analog_expiration_state', 'watchdog_set_digital_expiration_state',
+    'watchdog_reload', 'watchdog_stop', 'close',
 )  # fmt: skip
-def test_an_error_anywhere_is_explained_and_everything_released(call: str) -> None:
-    module = Module()
-    module.fail_at = call
-    driver = driver_on(module)
-    with pytest.raises(DriverError, match=r'failed.*check'):
-        session(driver)
+UNKNOWABLE = {(call, 'wrong') for call in ('write_analog', 'write_digital', 'close')}
+PHASES = ('open', 'start', 'run', 'disable', 'enable', 'stop', 'close')
+
+
+def steps(driver: QuanserDriver) -> dict[str, Callable[[], object]]:
+    """A session, step by step."""
+    return {
+        'open': driver.open,
+        'start': driver.start,
+        'run': lambda: run(driver),
+        'disable': driver.disable,
+        'enable': driver.enable,
+        'stop': driver.stop,
+        'close': driver.close,
+    }
+
+
+@pytest.mark.parametrize('board', [0, 1])
+@pytest.mark.parametrize('call', CALLS)
+def test_whatever_a_call_does_it_ends_without_current_and_comes_back(call: str, board: int) -> None:
+    """Each call x {once, for ever, interrupted, something foreign, wrong} x when it begins."""
+    kinds = [('error', 1.0), ('error', np.inf), ('foreign', 1.0), ('foreign', np.inf)]
+    kinds += [('interrupted', 2.0), ('interrupted', np.inf), ('wrong', 1.0), ('wrong', np.inf)]
+    for kind, times in kinds:
+        if (call, kind) in UNKNOWABLE:
+            continue
+        for begins in PHASES:
+            module = Module(offset=OFFSET, enable_line=5)
+            driver = driver_on(module, amplifier__offset=[OFFSET] * 12, **LINES)
+            failed = False
+            for name, step in steps(driver).items():
+                if name == begins:
+                    module.trouble = Trouble(call, board, times, kind)
+                try:
+                    step()
+                except DriverError:
+                    failed = True
+                    break
+            if kind == 'interrupted' and times == 2.0 and call != 'HIL':
+                assert not failed, 'a call that a signal interrupts is made again'
+            began = module.time
+            driver.close()
+            assert module.time - began <= 0.025 + 1e-9
+            if call == 'close' and times == np.inf:
+                continue  # nothing gives this handle back
+            module.check_end()
+            module.trouble = None
+            driver.open()  # a restart works
+            driver.start()
+            run(driver)
+            driver.stop()
+            driver.close()
+            module.check_end()
+
+
+@pytest.mark.parametrize('board', [0, 1])
+def test_a_board_that_cannot_be_told_keeps_its_watchdog(board: int) -> None:
+    module = Module(enable_line=5)
+    driver = driver_on(module, **LINES)
+    driver.open()
+    driver.start()
+    run(driver)
+    module.trouble = Trouble('write_analog', board)
+    with pytest.raises(DriverError):
+        driver.stop()
+    bad, good = module.cards[board], module.cards[1 - board]
+    assert bad.watchdog
+    assert np.any(bad.volts[:6])
+    assert not good.watchdog
+    assert not np.any(good.volts[:6])
+    assert not module.enabled  # what is possible is done
     driver.close()
-    assert not any(card.open for card in module.cards)
+    assert bad.expired
+    assert not np.any(bad.volts)
+    assert module.time == pytest.approx(0.02, abs=0.005)
+
+
+@pytest.mark.parametrize('directions', [True, False])
+def test_an_enable_line_that_cannot_be_told_is_let_go(directions: bool) -> None:
+    module = Module(enable_line=5)
+    driver = driver_on(module, **LINES)
+    driver.open()
+    driver.start()
+    assert module.enabled
+    refused = {'write_digital'} if directions else {'write_digital', 'set_digital_directions'}
+    module.trouble = Trouble(refused, 0)
+    if directions:
+        driver.disable()
+        assert not module.enabled
+    else:  # then the watchdog does it
+        with pytest.raises(DriverError):
+            driver.disable()
+    driver.close()
+    assert module.cards[0].expired != directions
+    assert not module.enabled
+
+
+def test_one_failure_does_not_leave_the_enable_line_on() -> None:
+    module = Module(enable_line=5)
+    driver = driver_on(module, **LINES)
+    driver.open()
+    driver.start()
+    run(driver)
+    module.trouble = Trouble('write_digital', 0, times=1)
+    driver.stop()
+    assert not module.enabled
+    assert module.cards[0].calls[-1] == 'watchdog_stop'
+
+
+@pytest.mark.parametrize('got', [0, None, 2])
+def test_a_sample_task_that_has_stopped_is_lost_boards(
+    got: int | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module = Module()
+    driver = driver_on(module)
+    driver.open()
+    driver.start()
+    run(driver)
+    monkeypatch.setattr(type(module.cards[0]), 'task_read_encoder', lambda *_: got)
+    with pytest.raises(DriverError, match='sample clock has stopped'):
+        driver.read(np.zeros(6, dtype=np.int32))
+
+
+def test_it_gives_up_on_a_call_that_is_interrupted_for_ever() -> None:
+    module = Module()
+    driver = driver_on(module)
+    driver.open()
+    driver.start()
+    module.trouble = Trouble('task_read_encoder', kind='interrupted')
+    with pytest.raises(DriverError, match='interrupted'):
+        driver.read(np.zeros(6, dtype=np.int32))
+    assert module.cards[0].calls.count('task_read_encoder') < 10
+
+
+def test_signals_interrupt_no_read() -> None:
+    """While it waits for a sample, the thread of the loop has them blocked; not afterwards."""
+    module = Module()
+    driver = driver_on(module)
+    seen: list[set[signal.Signals]] = []
+
+    def blocked() -> set[signal.Signals]:
+        return signal.pthread_sigmask(signal.SIG_BLOCK, [])  # type: ignore[return-value]
+
+    driver.open()
+    driver.start()
+    card = module.cards[0]
+    read = card.task_read_encoder
+    object.__setattr__(card, 'task_read_encoder', lambda *a: seen.append(blocked()) or read(*a))
+    run(driver, 1)
+    assert {signal.SIGINT, signal.SIGTERM, signal.SIGHUP} <= seen[0]
+    assert not blocked() & {signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
+    driver.close()
+
+
+def test_no_current_is_what_the_offset_says() -> None:
+    module = Module(offset=0.3)
+    driver = driver_on(module, amplifier__offset=[0.3] * 12)
+    driver.open()
+    assert all(card.resting for card in module.cards)
+    driver.start()
+    run(driver)
+    driver.disable()
+    assert all(card.resting for card in module.cards)
+    run(driver)
+    driver.stop()
+    assert all(card.resting for card in module.cards)
+    driver.start()
+    run(driver)
+    driver.close()
+    module.check_end()
 
 
 def test_enable_output_and_stop_input() -> None:
-    module = Module()
-    driver = driver_on(module, boards__stop_input=3, boards__enable_output=5)
+    module = Module(enable_line=5)
+    driver = driver_on(module, **LINES)
     driver.open()
-    assert module.enabled is False
+    assert not module.enabled
     driver.start()
-    assert module.enabled is True
+    assert module.enabled
     run(driver, 1)
     assert not driver.stop_pressed
-    module.stop_level = 0
+    module.stop_level = 1  # as a broken wire
     run(driver, 1)
     assert driver.stop_pressed
+    driver.disable()
+    assert not module.enabled
+    driver.enable()
+    assert module.enabled
     driver.stop()
-    assert module.enabled is False
+    assert not module.enabled
+    module.stop_level = 0
+    driver.counts(np.zeros(6, dtype=np.int32))
+    assert not driver.stop_pressed
     driver.close()
+
+
+def test_polarities_are_parameters() -> None:
+    module = Module()
+    driver = driver_on(
+        module, boards__enable_level=1, boards__open_level=0, boards__stop_level=0, **LINES
+    )
+    driver.open()
+    assert module.cards[0].latch[5] == 0
+    assert driver.stop_pressed
+    driver.start()
+    assert module.cards[0].latch[5] == 1
+    driver.close()
+    assert module.cards[0].latch[5] == 0
+
+
+@pytest.mark.parametrize(
+    ('given', 'text'),
+    [
+        ({'boards.enable_level': 1}, r'enable_level.*expires.*would be on'),
+        ({'boards.digital_expiry': 'low'}, r'enable_level.*would be on'),
+        ({'boards.digital_expiry': 'no_change'}, r'enable_level.*would be on'),
+        ({'boards.open_level': 0}, r'enable_level.*would be on'),
+        ({'boards.stop_input': 5}, r'stop_input'),
+    ],
+)
+def test_an_enable_line_that_expiry_would_turn_on_is_refused(
+    given: dict[str, object], text: str
+) -> None:
+    with pytest.raises(ParameterError, match=text):
+        build(BridgeParameters, {'boards.enable_output': 5, **given})
+    if 'boards.stop_input' not in given:
+        build(BridgeParameters, given)  # without such a line it is nobody's business
+
+
+def test_what_can_be_but_is_not_safe_is_said() -> None:
+    real = {'driver': 'quanser'}
+    wired = {**real, 'boards.stop_input': 3, 'boards.enable_output': 5}
+    assert doubts(build(BridgeParameters, wired)) == []
+    assert doubts(BridgeParameters()) == []
+    none = ' '.join(doubts(build(BridgeParameters, real)))
+    assert 'boards.stop_input' in none
+    assert 'boards.enable_output' in none
+    pulled = doubts(build(BridgeParameters, {**wired, 'boards.stop_level': 0}))
+    assert len(pulled) == 1
+    assert 'broken wire' in pulled[0]
+    offset = [0.0] * 7 + [0.3] + [0.0] * 4
+    left = doubts(build(BridgeParameters, {**wired, 'amplifier.offset': offset}))
+    assert len(left) == 1
+    assert 'amplifier.offset[7]' in left[0]
+
+
+def test_the_expiry_of_the_outputs_where_a_card_can_do_better() -> None:
+    module = Module(offset=0.3)
+    offset = [0.3] * 12
+    driver = driver_on(module, amplifier__offset=offset, boards__analog_expiry='no_current')
+    driver.open()
+    with pytest.raises(CallError, match='0 V'):  # not a Q8
+        driver.start()
 
 
 def test_the_check_finds_wrong_types() -> None:

@@ -1,7 +1,7 @@
 """One emulated board: the vendor's calls, on raw memory as the real ones.
 
-A buffer of the wrong type is silently taken for something else; an expired watchdog puts out 0 V
-and refuses everything until it is cleared.
+A buffer of the wrong type is silently taken for something else; an expired watchdog puts out 0 V,
+lets go of the digital lines, which are then pulled up, and refuses everything until it is cleared.
 """
 
 from __future__ import annotations
@@ -13,10 +13,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from maglev_hw_bridge.emulated_lines import LINES, Lines
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.signal_parameters import CHANNELS
-
-_LINES = 32
 
 
 class HILError(Exception):
@@ -71,7 +70,7 @@ class World(Protocol):
     counters: NDArray[np.int32]  # (boards, CHANNELS)
     cards: dict[str, EmulatedCard]
     failing: bool
-    stop_pressed: bool
+    lines: Lines  # of the first board
 
     def catch_up(self) -> None:
         """Let pass what has passed."""
@@ -93,7 +92,7 @@ class EmulatedCard:
         self._timeout = 0.0
         self._deadline: int | None = None
         self._expired = False
-        self._digital = np.zeros(_LINES, dtype=np.int8)
+        self._lines = world.lines if number == 0 else Lines(world.parameters)
 
     # Immediate input and output
 
@@ -127,24 +126,17 @@ class EmulatedCard:
     ) -> None:
         """Which digital lines are inputs and outputs."""
         self._check()
-        _channels(inputs, n_inputs, _LINES)
-        _channels(outputs, n_outputs, _LINES)
+        self._lines.direct(_channels(inputs, n_inputs, LINES), _channels(outputs, n_outputs, LINES))
 
     def read_digital(self, channels: Any, n: int, values: Any) -> None:
-        """Digital lines, int8; the first board's stop input is wired."""
+        """Digital lines, int8."""
         self._check()
-        which = _channels(channels, n, _LINES)
-        boards = self._world.parameters.boards
-        levels = self._digital.copy()
-        if self._number == 0 and boards.stop_input >= 0:
-            pressed = self._world.stop_pressed
-            levels[boards.stop_input] = boards.stop_level if pressed else 1 - boards.stop_level
-        _memory(values, np.int8, n)[:] = levels[which]
+        _memory(values, np.int8, n)[:] = self._lines.levels[_channels(channels, n, LINES)]
 
     def write_digital(self, channels: Any, n: int, values: Any) -> None:
         """Digital lines, int8."""
         self._check()
-        self._digital[_channels(channels, n, _LINES)] = _memory(values, np.int8, n)
+        self._lines.write(_channels(channels, n, LINES), _memory(values, np.int8, n))
 
     # Encoder reader task
 
@@ -200,7 +192,7 @@ class EmulatedCard:
     def watchdog_set_digital_expiration_state(self, channels: Any, n: int, states: Any) -> None:
         """What the digital lines become when it expires: a Q8 knows tristate only, int32."""
         self._check()
-        _channels(channels, n, _LINES)
+        _channels(channels, n, LINES)
         if np.any(_memory(states, np.int32, n) != DigitalState.TRISTATE):
             raise HILError(Code.HARDWARE, 'a Q8 can only be set to tristate on expiration')
 
@@ -232,6 +224,7 @@ class EmulatedCard:
         """Allow access again."""
         self._check(expired=True)
         self._expired = False
+        self._lines.let_go(False)
 
     def close(self) -> None:
         """Release the board; without a watchdog its outputs keep their voltage."""
@@ -248,12 +241,12 @@ class EmulatedCard:
             self._task.take(self._world.counters[self._number])
 
     def expire(self) -> None:
-        """The watchdog expires: 0 V, if that was asked for before it was started."""
+        """The watchdog expires: 0 V and no digital outputs, if that was asked for before it."""
         self._deadline = None
         self._expired = True
         if self._expiration:
             self._world.volts[self._number] = 0.0
-            self._digital[:] = 0
+            self._lines.let_go(True)
 
     def _reload(self) -> None:
         self._deadline = self._world.ticks + max(1, round(self._timeout / self._world.period))

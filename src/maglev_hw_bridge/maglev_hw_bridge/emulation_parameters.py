@@ -56,6 +56,20 @@ class WiringParameters:
         within=(-(2**31), 2**31 - 1),
         length=6,
     )
+    stop_line: int = parameter(
+        -1,
+        "digital line of the first board with the emergency stop's contact; -1: as boards says",
+        within=(-1, 31),
+    )
+    stop_level: int = parameter(
+        -1, 'its level when it is pressed; -1: as boards says', within=(-1, 1)
+    )
+    enable_line: int = parameter(
+        -1, 'digital line that enables the amplifiers; -1: as boards says', within=(-1, 31)
+    )
+    enable_level: int = parameter(
+        -1, 'its level that enables them; -1: as boards says', within=(-1, 1)
+    )
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -174,6 +174,11 @@ class BridgeParameters:
                 f"parameter 'fault.command_limit' is {self.fault.command_limit:g} A, it must be at "
                 f"least 'amplifier.continuous_current' ({self.amplifier.continuous_current:g} A)"
             )
+        if self.homing.at_start and self.driver != 'emulated':
+            raise ParameterError(
+                f"parameter 'homing.at_start' is true with driver '{self.driver}': only an emulated"
+                ' platen is known to rest on its lower stop; set it false and home by ~/home'
+            )
 
     def in_real_time(self) -> BridgeParameters:
         """What holds in real time: with emulated boards no time is below ``emulation.patience``."""

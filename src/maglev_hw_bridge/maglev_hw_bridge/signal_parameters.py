@@ -106,7 +106,9 @@ class EncoderInputParameters:
 class HomingParameters:
     """Homing: the platen rests on its lower stop and at known x and z; that defines the zeros."""
 
-    at_start: bool = parameter(False, 'home when the boards are configured; false: by ~/home')
+    at_start: bool = parameter(
+        False, 'emulated boards only: home when they are configured; false: by ~/home'
+    )
     x: float = parameter(
         -0.05, 'where the platen stands along X then', unit='m', within=(-1.0, 1.0)
     )
@@ -122,6 +124,13 @@ class HomingParameters:
         'how far a second homing may move a zero from that of the first',
         unit='m',
         within=(0.0, 1.0),
+    )
+    lift: float = parameter(
+        3e-4,
+        'how far ~/home lifts the platen to find out that the stop below it is the lower one; '
+        '0: not at all, who calls it vouches for that',
+        unit='m',
+        within=(0.0, 1e-3),
     )
 
 
@@ -194,6 +203,7 @@ class DriveParameters:
         """Refuse what each value alone cannot show to be wrong."""
         check_places('amplifier', self.board, self.channel)
         check_signs('amplifier.sign', self.sign)
+        self._check_reach()
         if self.continuous_current > self.peak_current:
             raise ParameterError(
                 f"parameter 'amplifier.continuous_current' is {self.continuous_current:g} A, it "
@@ -204,6 +214,18 @@ class DriveParameters:
                 "parameters 'amplifier.warn_load', 'derate_load', 'trip_load' are "
                 f'{self.warn_load:g}, {self.derate_load:g}, {self.trip_load:g}: they must rise'
             )
+
+    def _check_reach(self) -> None:
+        """Refuse an output that cannot ask for the peak current either way round."""
+        for phase, (gain, offset) in enumerate(zip(self.gain, self.offset, strict=True)):
+            reach = gain * (self.voltage_range - abs(offset))
+            if reach < self.peak_current:
+                raise ParameterError(
+                    f"parameter 'amplifier.gain[{phase}]' is {gain:g} A/V: with "
+                    f"'voltage_range' ({self.voltage_range:g} V) and 'offset[{phase}]' "
+                    f"({offset:g} V) that reaches {reach:g} A, less than 'peak_current' "
+                    f'({self.peak_current:g} A)'
+                )
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -228,10 +250,68 @@ class BoardParameters:
         -1, 'digital input of the first board that is an emergency stop; -1: none', within=(-1, 31)
     )
     stop_level: int = parameter(
-        0, 'level of that input that means stop; 0 is fail-safe', within=(0, 1)
+        1,
+        'level of that input that means stop; it should be what a broken wire reads, open_level',
+        within=(0, 1),
+    )
+    stop_time: float = parameter(
+        5.0,
+        'after an emergency stop the amplifiers are disabled when the platen has landed, at the '
+        'latest after this',
+        unit='s',
+        within=(0.1, 120.0),
     )
     enable_output: int = parameter(
         -1,
         'digital output of the first board that enables the amplifiers; -1: none',
         within=(-1, 31),
     )
+    enable_level: int = parameter(
+        0,
+        'level of that output that enables them; it must not be what the line becomes when the '
+        'watchdog expires',
+        within=(0, 1),
+    )
+    open_level: int = parameter(
+        1, 'level of a digital line that nothing drives: a Q8 pulls it up', within=(0, 1)
+    )
+    digital_expiry: str = parameter(
+        'tristate',
+        'what digital outputs become when the watchdog expires; a Q8 knows tristate only',
+        choices=('tristate', 'low', 'high', 'no_change'),
+    )
+    analog_expiry: str = parameter(
+        'zero',
+        'what analog outputs become then: 0 V, as a Q8 must, or the voltage that makes no current',
+        choices=('zero', 'no_current'),
+    )
+    memory: str = parameter(
+        '',
+        "file that keeps the amplifiers' I2t load and a latched fault while no bridge runs, and "
+        'that keeps a second one from the boards; empty: one by boards.type and identifier in '
+        '$XDG_STATE_HOME/maglev-stage (~/.local/state), none with emulated boards',
+    )
+
+    def __post_init__(self) -> None:
+        """Refuse an enable line that a watchdog which expires would turn on, and shared lines."""
+        if self.enable_output < 0:
+            return
+        if self.enable_output == self.stop_input:
+            raise ParameterError(
+                f"parameter 'boards.enable_output' is {self.enable_output}, which is "
+                "'boards.stop_input' as well; each needs a line of its own"
+            )
+        if self.expired_level in (self.enable_level, None):
+            becomes = ('low', 'high')[self.enable_level] if self.expired_level is not None else 'on'
+            raise ParameterError(
+                f"parameter 'boards.enable_level' is {self.enable_level}: with digital_expiry "
+                f"'{self.digital_expiry}' and open_level {self.open_level} the line stays or goes "
+                f'{becomes} when the watchdog expires, and the amplifiers would be on; let the '
+                'other level enable them, through an inverter or a relay'
+            )
+
+    @property
+    def expired_level(self) -> int | None:
+        """Level of the digital outputs when the watchdog has expired; None: as they were."""
+        levels = {'tristate': self.open_level, 'low': 0, 'high': 1, 'no_change': None}
+        return levels[self.digital_expiry]

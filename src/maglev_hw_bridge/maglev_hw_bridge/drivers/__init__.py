@@ -23,24 +23,26 @@ class DriverError(RuntimeError):
 
 
 class WatchdogError(DriverError):
-    """The boards' watchdog expired: they put out 0 V and refuse everything until they are reset."""
+    """The boards' watchdog expired: they went to their expiry states and refuse everything."""
 
 
 class Driver(Protocol):
     """What the bridge asks of the boards, in this order; every call may raise DriverError.
 
     :meth:`open`, :meth:`counts` any time, :meth:`start`, then :meth:`read` and :meth:`write` once a
-    sample, :meth:`stop`, :meth:`close`. After :meth:`stop` it may be started again.
+    sample, :meth:`disable` and :meth:`enable` between two samples, :meth:`stop`, :meth:`close`.
+    After :meth:`stop` it may be started again. No current is what ``amplifier.offset`` says, which
+    need not be 0 V.
     """
 
     late: float
     """By how much the sample read last was behind its tick [s]."""
 
     stop_pressed: bool
-    """Whether the emergency stop input was active at the last :meth:`read`."""
+    """Whether the emergency stop input was active at the last :meth:`read` or :meth:`counts`."""
 
     def open(self) -> None:
-        """Open and check the boards, with outputs at 0 V."""
+        """Open and check the boards: no current, amplifiers disabled."""
         ...
 
     def counts(self, counts: CountArray) -> None:
@@ -48,7 +50,7 @@ class Driver(Protocol):
         ...
 
     def start(self) -> None:
-        """Arm the watchdog, enable the amplifiers and start the clock that paces :meth:`read`."""
+        """Arm the watchdog, start the clock that paces :meth:`read`, enable the amplifiers."""
         ...
 
     def read(self, counts: CountArray) -> None:
@@ -59,12 +61,20 @@ class Driver(Protocol):
         """Put out the volts of the twelve phases, shape (12,), and reload the watchdog."""
         ...
 
+    def disable(self) -> None:
+        """No current, amplifiers disabled; samples go on."""
+        ...
+
+    def enable(self) -> None:
+        """Amplifiers enabled, without current."""
+        ...
+
     def stop(self) -> None:
-        """Outputs at 0 V, amplifiers disabled, watchdog and clock stopped."""
+        """No current, amplifiers disabled; then, only where that succeeded, watchdog stopped."""
         ...
 
     def close(self) -> None:
-        """Release the boards with outputs at 0 V; may be called twice and must not raise."""
+        """As stop, and release the boards; may be called twice and must not raise."""
         ...
 
 

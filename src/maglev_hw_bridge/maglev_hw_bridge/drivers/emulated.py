@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from maglev_hw_bridge.drivers.quanser import QuanserDriver
 from maglev_hw_bridge.emulated_card import Clock, Code, DigitalState, EmulatedCard, HILError
+from maglev_hw_bridge.emulated_lines import Lines
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.rig import Rig
 from maglev_hw_bridge.signal_parameters import CHANNELS
@@ -32,7 +33,7 @@ class EmulatedDriver(QuanserDriver):
     """The Quanser driver, which on emulated boards can also tell the truth."""
 
     def __init__(self, parameters: BridgeParameters, boards: EmulatedBoards) -> None:
-        super().__init__(parameters, boards, boards.now)
+        super().__init__(parameters, boards, boards.now, boards.sleep)
         self.boards = boards
         self._first = 0
 
@@ -52,6 +53,7 @@ class EmulatedBoards:
 
     Faults, from now on: ``stuck``, ``jumps`` (counts added) by encoder; ``dead(phase)``;
     ``delay(samples)``; ``failing`` (every call raises); ``stop_pressed``; :meth:`expire`.
+    ``lines`` are the first board's digital lines, which outlast a bridge as the outputs do.
     """
 
     HILError = HILError
@@ -81,13 +83,14 @@ class EmulatedBoards:
         self.jumps = np.zeros(6, dtype=np.int64)
         self.stuck = np.zeros(6, dtype=bool)
         self.failing = False
-        self.stop_pressed = False
+        self.lines = Lines(parameters)
         self._held = self.rig.counts()
         self.past = np.zeros((parameters.boards.buffer + 2, 18))
         self._delay = 0
         self._inject = parameters.emulation.inject
         wiring = parameters.emulation.wiring
         self._outputs = (np.array(wiring.phase_board), np.array(wiring.phase_channel))
+        self._no_current = np.array(wiring.offset)
         self._inputs = (np.array(wiring.encoder_board), np.array(wiring.encoder_channel))
         self._count()
 
@@ -117,7 +120,8 @@ class EmulatedBoards:
     def tick(self) -> None:
         """One sample passes."""
         self._inject_faults()
-        self.rig.advance(self.volts[self._outputs])
+        enabled = self.lines.enabled
+        self.rig.advance(self.volts[self._outputs] if enabled else self._no_current)
         self.ticks += 1
         row = self.past[self.ticks % len(self.past)]
         row[:10], row[10:] = self.rig.state, self.rig.stage.command
@@ -150,6 +154,24 @@ class EmulatedBoards:
         if ahead > 0.0:
             self._sleep(ahead)
         self.catch_up()
+
+    @property
+    def stop_pressed(self) -> bool:
+        """Whether the emergency stop is pressed."""
+        return self.lines.stop_pressed
+
+    @stop_pressed.setter
+    def stop_pressed(self, pressed: bool) -> None:
+        self.lines.stop_pressed = pressed
+
+    def sleep(self, seconds: float) -> None:
+        """Let time pass on the boards while nobody waits for a sample."""
+        if self.realtime:
+            self._sleep(seconds)
+            self.catch_up()
+            return
+        for _ in range(round(seconds / self.period)):
+            self.tick()
 
     def dead(self, phase: int) -> None:
         """No current flows in a phase (0..11) any more."""
