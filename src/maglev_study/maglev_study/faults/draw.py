@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from maglev_study.faults.catalogue import KINDS, Fault
+from maglev_study.faults.catalogue import KINDS
 from maglev_study.faults.fly import Scenario
+from maglev_study.faults.kinds import Fault
 
 PER_MACHINE = 120
 """Runs that one machine's programme is flown for."""

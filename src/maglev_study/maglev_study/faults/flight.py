@@ -10,9 +10,8 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
-
-import numpy as np
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.supervision import Supervisor
@@ -21,12 +20,16 @@ from maglev_hw_bridge.encoders import HomingError
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.stage import BridgeStage
 from maglev_model.axes import FloatArray
+from maglev_model.controller_watch import ControllerWatch, Verdict
 from maglev_model.parameters import build
 from maglev_model.stage import EncoderSample, StageError
 from maglev_study.faults.programme import RESET, STOP, Programme
 from maglev_study.faults.world import World
 
 _LONGEST_GAP = 20  # samples a controller misses before it gives up
+SESSION = 4711
+"""Of the one controller there should be."""
+
 _POLL = 100  # samples from a look at the signals to the next
 
 
@@ -36,21 +39,24 @@ class Answer(NamedTuple):
     sequence: int
     direct: FloatArray
     quadrature: FloatArray
+    status: int
+    session: int = SESSION
+    stamped: bool = True  # with the stamp of the measurement they answer
 
 
 class Bridge:
     """The bridge's process."""
 
     def __init__(self, parameters: BridgeParameters, world: World) -> None:
-        driver = QuanserDriver(parameters, world, world.now)
+        driver = QuanserDriver(parameters, world, world.now, world.sleep)
         self.stage = BridgeStage(parameters, driver=driver)
         self.alive = True
         self.active = self.homed = self.vanished = False
         self.stray = ''  # what left the stage and is none of its errors
         self.refused = ''  # what was refused last
         self.sequence = -1
-        self.lost = self._armed = self._answered = False
-        self._applied = -1
+        self.lost = False
+        self._watch = ControllerWatch()
         self._signals: list[int] = []
         self._looks = 0
         self._finally: Callable[[], None] | None = None  # when it has landed by itself
@@ -69,8 +75,8 @@ class Bridge:
     def activate(self) -> bool:
         """Begin to sample."""
         self.active = self._try(self.stage.activate)
-        self.lost = self._armed = self._answered = False
-        self._applied = -1
+        self.lost = False
+        self._watch.forget()
         return self.active
 
     def deactivate(self) -> None:
@@ -132,9 +138,7 @@ class Bridge:
         cleared: list[bool] = []
         self._try(lambda: cleared.append(self.stage.reset()[0]))
         if any(cleared):
-            self._armed = False
-            if self.lost:
-                self._answered = False
+            self._watch.forget()
             self.lost = False
         return any(cleared)
 
@@ -167,27 +171,37 @@ class Bridge:
             self.end()
 
     def _answer(self, inbox: list[Answer]) -> None:
-        newest = inbox[-1] if inbox else None
-        for answer in inbox:
-            self._answered |= answer.sequence >= self.sequence - 2
-        if self._finally is not None or newest is None or newest.sequence == self._applied:
+        """Follow the newest currents that are to be followed; none while it ends."""
+        fresh = None
+        for answer in inbox if self._finally is None else ():
+            if self._heed(answer) is Verdict.FOLLOWED:
+                fresh = answer
+        if fresh is None:
             self._try(self.stage.hold, lose=True)
-            return
-        self._applied = newest.sequence
-        if not self._armed:
-            flowing = np.any(newest.direct) or np.any(newest.quadrature)
-            self._armed = self._answered and not flowing
-        if self._armed:
-            self._try(lambda: self._write(newest), lose=True)
         else:
-            self._try(self.stage.hold, lose=True)
+            self._try(partial(self._write, fresh), lose=True)
+
+    def _heed(self, answer: Answer) -> Verdict:
+        verdict = self._watch.judge(
+            answer.session,
+            answer.sequence,
+            answer.status,
+            answer.direct,
+            answer.quadrature,
+            stamped=answer.stamped,
+            sample=self.sequence,
+            flying=self.stage.flying,
+        )
+        if verdict is Verdict.REFUSED and self.stage.fault is None:
+            self._try(lambda: self.stage.stop(self._watch.why, kind='controller'))
+        return verdict
 
     def _write(self, answer: Answer) -> None:
         try:
-            self.stage.write(answer.direct, answer.quadrature)
+            self.stage.write(answer.direct, answer.quadrature, self.sequence - answer.sequence)
         except ValueError as error:
             if self.stage.fault is None:
-                self.stage.stop(str(error))
+                self.stage.stop(str(error), kind='controller')
 
     def _try(self, action: Callable[[], object], *, lose: bool = False) -> bool:
         """Do it; a refusal is kept, any other error ends the process as in a callback."""
@@ -240,17 +254,24 @@ class Controller:
         return answers
 
     def last_words(self) -> list[Answer]:
-        """Die of an exception, politely."""
+        """Give up at once, and say so."""
         self.alive = False
-        self.supervisor.cut('shut down')
+        if not self.supervisor.flying:
+            return []
+        self.supervisor.give_up('shut down')
         return [self._currents(self._sequence)]
+
+    def defect(self) -> None:
+        """Die of an exception: after a landing where it flies."""
+        self.supervisor.stop('defect: injected')
+        self.alive = self.supervisor.flying
 
     def _answer(self, sequence: int, sample: EncoderSample) -> Answer:
         supervisor = self.supervisor
         if not self.heeded:
             return self._currents(sequence)
         if self._sequence >= 0 and sequence - self._sequence > _LONGEST_GAP and supervisor.flying:
-            supervisor.cut('measurements are missing')
+            supervisor.stop('measurements are missing')
         self._sequence = sequence
         supervisor.step(supervisor.references.find(sequence), *sample)
         return self._currents(sequence)
@@ -258,7 +279,10 @@ class Controller:
     def _currents(self, sequence: int) -> Answer:
         supervisor = self.supervisor
         return Answer(
-            sequence, supervisor.direct_current.copy(), supervisor.quadrature_current.copy()
+            sequence,
+            supervisor.direct_current.copy(),
+            supervisor.quadrature_current.copy(),
+            int(supervisor.status),
         )
 
 

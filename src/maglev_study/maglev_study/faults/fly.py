@@ -6,10 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from maglev_model.controller_watch import Status
 from maglev_model.modes import Mode
-from maglev_study.faults.catalogue import CUT, KINDS, Expected, Fault, Run
+from maglev_study.faults.catalogue import KINDS
 from maglev_study.faults.flight import Answer, Bridge, Flight
 from maglev_study.faults.judge import Judge, Verdict
+from maglev_study.faults.kinds import CUT, Expected, Fault, Run
 from maglev_study.faults.programme import BEFORE_THE_FIRST_SAMPLE, ON_THE_GROUND
 
 _WATCHED = 1000  # samples without a finding, until the operator lands
@@ -180,7 +182,7 @@ class Course:
         flight = self.flight
         for _ in range(samples):
             currents = np.full(4, 2.0)
-            flight.inbox = [Answer(flight.bridge.sequence, currents, currents)]
+            flight.inbox = [Answer(flight.bridge.sequence, currents, currents, Status.FLYING)]
             self.step()
 
     def _release(self) -> None:

@@ -12,8 +12,9 @@ import numpy as np
 
 from maglev_hw_bridge.rig import Rig
 from maglev_model.axes import FloatArray
-from maglev_study.faults.catalogue import CUT, DEGRADED, SHOWS, Expected
 from maglev_study.faults.flight import Flight
+from maglev_study.faults.hardware_faults import SHOWS
+from maglev_study.faults.kinds import CUT, DEGRADED, Expected
 from maglev_study.faults.programme import PERIOD
 
 RULES = {

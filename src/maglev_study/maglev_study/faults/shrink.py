@@ -5,9 +5,10 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterator
 
-from maglev_study.faults.catalogue import KINDS, Fault
+from maglev_study.faults.catalogue import KINDS
 from maglev_study.faults.fly import Scenario
 from maglev_study.faults.judge import Verdict
+from maglev_study.faults.kinds import Fault
 from maglev_study.faults.machines import NOMINAL
 from maglev_study.faults.train import fly_all
 

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from maglev_hw_bridge.drivers.emulated import EmulatedBoards
 from maglev_hw_bridge.emulated_card import EmulatedCard
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_study.faults.machines import ENABLE_OUTPUT
 
 CALLS = (
     'HIL',
@@ -72,7 +71,6 @@ class World(EmulatedBoards):
         self.rng = np.random.default_rng(0)
         self._behaviour: dict[tuple[str, int], Behaviour] = {}
         self._proxies: list[FaultyCard] = []
-        self._first: EmulatedCard | None = None  # the one with the digital lines, opened last
         self._rest = np.array(parameters.emulation.wiring.offset)
         self._gains = np.zeros(12)
         super().__init__(parameters)
@@ -94,8 +92,6 @@ class World(EmulatedBoards):
     def _open(self, card_type: str, identifier: str) -> FaultyCard:
         card = super().HIL(card_type, identifier)
         number = int(identifier)
-        if number == 0:
-            self._first = card
         proxy = FaultyCard(self, card, number)
         self._proxies.append(proxy)
         return proxy
@@ -154,7 +150,7 @@ class World(EmulatedBoards):
     @property
     def enabled(self) -> bool:
         """Whether the amplifiers' enable line says so."""
-        return self._first is not None and bool(self._first._digital[ENABLE_OUTPUT])
+        return self.lines.enabled
 
     def let_pass(self, samples: int) -> None:
         """Time passes, with nobody calling."""
