@@ -24,7 +24,7 @@ from maglev_study.faults.tally import Tally
 PASS, BROKEN, WRONG_USE, INTERRUPTED = 0, 1, 2, 130
 
 _RUNS = 3000
-_SHRUNK = 24  # failures, of different kinds
+_SHRUNK = 12  # failures, of different kinds
 _MOST_RUNS = 10_000_000
 
 
@@ -64,20 +64,23 @@ def _fly(runs: Sequence[Scenario], jobs: int, out: Path) -> int:
             flush=True,
         )
 
+    def report() -> Path:
+        spent = time.monotonic() - started
+        words = [f'{len(outcomes)} of {len(runs)} runs', f'{spent:.0f} s', f'{jobs} processes']
+        words.append(f'seeds {runs[0].seed} to {runs[-1].seed}')
+        return write(out, tally, shrunk, words, len(outcomes) == len(runs))
+
     with Campaign(jobs) as campaign:
         campaign.fly(runs, heard)
         tally = Tally(sorted(outcomes, key=lambda one: one.run.seed))
+        path = report()
         examples = tally.examples()[:_SHRUNK]
         if examples and not campaign.interrupted:
             print(f'faults: making {len(examples)} failures smaller', flush=True)
             campaign.shrink(examples, shrunk.append)
-    spent = time.monotonic() - started
-    complete = not campaign.interrupted
-    words = [f'{len(outcomes)} of {len(runs)} runs', f'{spent:.0f} s', f'{jobs} processes']
-    words.append(f'seeds {runs[0].seed} to {runs[-1].seed}')
-    path = write(out, tally, shrunk, words, complete)
+            path = report()
     _tell(tally, shrunk, path)
-    if not complete:
+    if campaign.interrupted:
         print('faults: interrupted', file=sys.stderr)
         return INTERRUPTED
     return BROKEN if tally.failures else PASS

@@ -15,7 +15,7 @@ from maglev_study.faults.train import fly_all
 _SIMPLE = (('rest', 0.5), ('hover', 0.98), ('lift-off', 0.5), ('ellipse', 0.5))
 """Phases to try, the simplest first."""
 
-_MOST = 25  # tries
+_MOST = 8  # tries
 
 
 def shrink(
