@@ -175,14 +175,18 @@ class Observer:
 
     def ask(self, client: Any, request: Any, timeout: float = 20.0) -> Any:
         """The answer of any service."""
+        future = self.begin_to_ask(client, request, timeout)
+        self._executor.spin_until_future_complete(future, timeout_sec=timeout)
+        assert future.done(), f'{client.srv_name} never answered'
+        return future.result()
+
+    def begin_to_ask(self, client: Any, request: Any, timeout: float = 20.0) -> Any:
+        """The future answer of any service."""
         assert client.wait_for_service(timeout_sec=timeout), f'there is no {client.srv_name}'
         if client not in self._heard:  # there for us, but are we there for it?
             self._heard.append(client)
             self.serve(_MATCHING)
-        future = client.call_async(request)
-        self._executor.spin_until_future_complete(future, timeout_sec=timeout)
-        assert future.done(), f'{client.srv_name} never answered'
-        return future.result()
+        return client.call_async(request)
 
     def serve(self, duration: float) -> None:
         """Let callbacks of the test's own run."""
@@ -190,13 +194,20 @@ class Observer:
 
     def set_parameters(self, node: str, **values: Any) -> Any:
         """Set parameters of a node all at once; ``__`` in a name stands for a dot."""
+        future = self.begin_to_set(node, **values)
+        self._executor.spin_until_future_complete(future, timeout_sec=60.0)
+        assert future.done(), f'{node} never answered'
+        return future.result().result
+
+    def begin_to_set(self, node: str, **values: Any) -> Any:
+        """As :meth:`set_parameters`, but only the future answer."""
         client = self._client(SetParametersAtomically, f'/{node}/set_parameters_atomically')
         request = SetParametersAtomically.Request()
         request.parameters = [
             Parameter(name.replace('__', '.'), value=value).to_parameter_msg()
             for name, value in values.items()
         ]
-        return self.ask(client, request).result
+        return self.begin_to_ask(client, request)
 
     def close(self) -> None:
         """Leave the graph."""

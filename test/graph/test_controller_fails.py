@@ -1,0 +1,127 @@
+"""Every way a controller can end in flight: it lands, or the bridge does, softly."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from flight import ELLIPSE, LONG, LOWER_STOP, WATCHED, airborne, gap, impact_speed
+from graph import Nodes, Observer, Process
+from std_srvs.srv import Trigger
+
+from maglev_msgs.msg import ControllerState, Currents
+from maglev_node.topics import CONTROLLER_STATE, CURRENTS, MEASUREMENT, TRUE_STATE, sample_qos
+
+SOFT = 0.01  # [m/s]
+FAILING = Path(__file__).resolve().parents[1] / 'support' / 'failing_controller.py'
+
+
+def fly(nodes: Nodes, observer: Observer, failing: str = '') -> dict[str, Process]:
+    """Bridge, controller and reference on the ellipse, until it is airborne."""
+    graph = {'stage': nodes.start('hw_bridge', WATCHED, params=('hw_bridge.yaml',))}
+    if failing:
+        command = [sys.executable, str(FAILING), failing, '--ros-args', '-p', WATCHED]
+        graph['controller'] = nodes.run('controller', command)
+    else:
+        graph['controller'] = nodes.start('controller', WATCHED)
+    graph['reference'] = nodes.start('reference', LONG, WATCHED, params=(ELLIPSE,))
+    observer.wait(lambda: airborne(observer), timeout=120.0)
+    return graph
+
+
+def landed_softly(observer: Observer) -> None:
+    """Wait until the platen rests on its stop and stays there; it has come down softly."""
+
+    def rests() -> bool:
+        state = observer.newest(TRUE_STATE)
+        return bool(abs(state.state[0] - LOWER_STOP) < 1e-5 and abs(state.state[1]) < 1e-4)
+
+    observer.wait(rests, timeout=120.0)
+    assert impact_speed(observer) <= SOFT
+
+
+def test_its_emergency_stop_lands_and_stays(nodes: Nodes, watching: Observer) -> None:
+    graph = fly(nodes, watching)
+    before = watching.newest(MEASUREMENT).sequence
+    assert 'landing' in watching.call('/controller/emergency_stop').message
+    watching.wait(lambda: watching.newest(CONTROLLER_STATE).mode == ControllerState.LANDING)
+    assert not watching.call('/controller/reset').success
+    landed_softly(watching)
+    assert watching.newest(CONTROLLER_STATE).mode == ControllerState.FAULT
+    assert not watching.call('/controller/enable', True).success
+    assert watching.call('/controller/reset').success
+    assert 'fault' not in graph['stage'].output
+    sent = [m for m in watching.look()[CURRENTS] if m.sequence > before]
+    assert {m.status for m in sent} == {Currents.FLYING, Currents.RESTING}
+    assert len({m.session for m in sent}) == 1
+
+
+@pytest.mark.parametrize(
+    'signals', [(signal.SIGINT, signal.SIGINT), (signal.SIGINT, signal.SIGTERM)]
+)
+def test_two_signals_at_once_land_as_one_does(
+    nodes: Nodes, watching: Observer, signals: tuple[signal.Signals, ...]
+) -> None:
+    graph = fly(nodes, watching)
+    for number in signals:
+        graph['controller'].signal(number)
+        time.sleep(0.01)
+    landed_softly(watching)
+    assert graph['controller'].wait() == 0
+    assert 'fault' not in graph['stage'].output
+
+
+def test_a_defect_beside_the_loop_is_a_landing_of_its_own(nodes: Nodes, watching: Observer) -> None:
+    graph = fly(nodes, watching, 'beside')
+    assert graph['controller'].wait(120.0) == 70
+    landed_softly(watching)
+    assert 'landing at sample' in graph['controller'].output
+    assert "defect: RuntimeError('made to fail')" in graph['controller'].output
+    assert 'fault' not in graph['stage'].output
+
+
+@pytest.mark.parametrize('how', ['law', 'measurement'])
+def test_where_it_cannot_go_on_the_bridge_lands(nodes: Nodes, watching: Observer, how: str) -> None:
+    graph = fly(nodes, watching, how)
+    graph['stage'].wait_for('the controller gave up (landed by the stage)', timeout=120.0)
+    landed_softly(watching)
+    if how == 'law':
+        assert graph['controller'].wait() == 70
+    else:
+        assert 'the measurement is not finite' in graph['controller'].output
+        watching.wait(lambda: watching.newest(CONTROLLER_STATE).mode == ControllerState.FAULT)
+    assert graph['stage'].running
+
+
+def test_whoever_else_publishes_currents_is_not_obeyed(nodes: Nodes, watching: Observer) -> None:
+    graph = fly(nodes, watching)
+    publisher = watching.node.create_publisher(Currents, CURRENTS, sample_qos())
+    watching.wait(lambda: publisher.get_subscription_count() >= 2)
+    newest = watching.newest(CURRENTS)
+    publisher.publish(
+        Currents(header=newest.header, sequence=newest.sequence, direct_current=[5.0] * 4)
+    )
+    graph['stage'].wait_for('somebody else')
+    landed_softly(watching)
+    assert gap(watching) == pytest.approx(LOWER_STOP, abs=1e-5)
+
+
+def test_during_a_redesign_the_emergency_stop_is_served(nodes: Nodes, watching: Observer) -> None:
+    fly(nodes, watching)
+    client = watching.node.create_client(Trigger, '/controller/emergency_stop')
+    assert client.wait_for_service(timeout_sec=20.0)
+    watching.serve(0.5)
+    changing = watching.begin_to_set('controller', y__bandwidth=180.0)
+    watching.serve(0.3)
+    assert not changing.done()
+    before = watching.newest(MEASUREMENT).sequence
+    watching.ask(client, Trigger.Request())
+    stopped = [m for m in watching.look()[CONTROLLER_STATE] if m.mode == ControllerState.LANDING]
+    assert not changing.done()
+    assert stopped
+    assert stopped[0].sequence - before < 20  # some of which passed before the call was out
+    landed_softly(watching)
+    watching.wait(changing.done)
