@@ -16,20 +16,16 @@ import numpy as np
 from maglev_hw_bridge.diagnosis import diagnose
 from maglev_hw_bridge.drivers import Driver, DriverError, make_driver
 from maglev_hw_bridge.encoders import Encoders, HomingError
-from maglev_hw_bridge.landing import LEAST_ATTRACTION
+from maglev_hw_bridge.lift import Lift
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.response import Pulses, Twins
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES, PHASE_NAMES, PHASES
-from maglev_hw_bridge.stage import BridgeStage, Mode
+from maglev_hw_bridge.stage import BridgeStage
 from maglev_model.axes import FloatArray
-from maglev_model.inverse import CurrentLimits, exact_currents
-from maglev_model.machine import machine_constants
 from maglev_model.parameters import ParameterError, from_yaml
 from maglev_model.stage import StageError
 
 _HOP = 5e-4  # first lift-off [m]
-_RISE, _HOVER = 0.5, 0.5  # [s]
-_TILT = 5e-4  # more tilt than this in the first lift-off is wrong [rad]
 
 
 class WrongError(Exception):
@@ -128,25 +124,27 @@ class Commissioning:
 
     def _first_lift_off(self) -> None:
         self._ask(
-            f'first lift-off by {_HOP * 1e3:g} mm for {_RISE + _HOVER:g} s, then landing; the '
-            'platen rests where it was homed or was moved to by hand'
+            f'first lift-off by {_HOP * 1e3:g} mm for a second, then landing; the platen rests '
+            'where it was homed or was moved to by hand'
         )
+        lift = Lift(self._parameters, _HOP)
         stage = BridgeStage(self._parameters, realtime=self._realtime, driver=self._driver)
         try:
             stage.configure()
             stage.encoders.arrays.zero[:] = self._encoders.arrays.zero
+            stage.encoders.homed = True
             stage.activate()
-            highest, tilt = _hop(stage, self._parameters)
+            lift.fly(stage)
         finally:
             stage.close()
         if stage.fault is not None:
             raise WrongError(f'{stage.fault}; check machine.* and the currents')
-        if not 0.5 * _HOP < highest < 1.5 * _HOP or tilt > _TILT:
+        seen = f'rose {lift.risen * 1e3:.2f} mm, tilted {lift.tilt * 1e3:.2f} mrad at most'
+        if not lift.fine:
             raise WrongError(
-                f'it rose {highest * 1e3:.2f} mm and tilted {tilt * 1e3:.2f} mrad: check '
-                'amplifier.gain, amplifier.offset, commutation.* and machine.*'
+                f'it {seen}: check amplifier.gain, amplifier.offset, commutation.* and machine.*'
             )
-        self._tell(f'  rose {highest * 1e3:.2f} mm, tilted {tilt * 1e3:.2f} mrad at most, landed')
+        self._tell(f'  {seen}, landed')
 
 
 def _in_words(response: FloatArray) -> str:
@@ -160,38 +158,6 @@ def _in_words(response: FloatArray) -> str:
         ]
         texts.append(f'{sign}: {", ".join(parts) or "nothing moves"}')
     return '; '.join(texts)
-
-
-def _hop(stage: BridgeStage, parameters: BridgeParameters) -> tuple[float, float]:
-    """Rise, hover, land: greatest rise [m] and tilt [rad] while it hovers."""
-    period, landing = parameters.sample_time, parameters.landing
-    stiffness, damping = np.array(landing.stiffness), np.array(landing.damping)
-    watched, machine = stage.guard.arrays, machine_constants(parameters.machine)
-    limits = CurrentLimits(landing.current, 1.0, LEAST_ATTRACTION)
-    stage.read()
-    stage.hold()
-    stage.read()
-    target = watched.position.copy()
-    start, rest = target[0], parameters.machine.gap_max
-    target[3:] = 0.0
-    heights, tilt = [], 0.0
-    for n in range(round((_RISE + _HOVER) / period)):
-        risen = min(n * period / _RISE, 1.0)
-        target[0] = start - _HOP * risen**2 * (3.0 - 2.0 * risen)
-        wanted = stiffness * (target - watched.position) - damping * watched.rate
-        i_d, i_q, _ = exact_currents(machine, watched.position[None], wanted[None], limits)
-        stage.write(i_d[0], i_q[0])
-        stage.read()
-        if risen >= 1.0:
-            heights.append(rest - watched.position[0])
-            tilt = max(tilt, float(np.max(np.abs(watched.position[3:]))))
-        if stage.mode is not Mode.FOLLOWING:
-            break
-    stage.land('commissioned')
-    while stage.flying:
-        stage.hold()
-        stage.read()
-    return float(np.mean(heights)) if heights else 0.0, tilt
 
 
 def _ask_operator(step: str) -> None:

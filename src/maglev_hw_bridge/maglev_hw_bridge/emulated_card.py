@@ -71,6 +71,7 @@ class World(Protocol):
     cards: dict[str, EmulatedCard]
     failing: bool
     lines: Lines  # of the first board
+    expired: NDArray[np.bool_]  # watchdogs, until they are cleared
 
     def catch_up(self) -> None:
         """Let pass what has passed."""
@@ -91,7 +92,6 @@ class EmulatedCard:
         self._expiration = False
         self._timeout = 0.0
         self._deadline: int | None = None
-        self._expired = False
         self._lines = world.lines if number == 0 else Lines(world.parameters)
 
     # Immediate input and output
@@ -210,7 +210,7 @@ class EmulatedCard:
     def watchdog_reload(self) -> bool:
         """Start it over; false when it had expired."""
         self._check(expired=True)
-        if self._expired:
+        if self._world.expired[self._number]:
             return False
         self._reload()
         return True
@@ -218,12 +218,12 @@ class EmulatedCard:
     def watchdog_is_expired(self) -> bool:
         """Whether it has expired."""
         self._check(expired=True)
-        return self._expired
+        return bool(self._world.expired[self._number])
 
     def watchdog_clear(self) -> None:
         """Allow access again."""
         self._check(expired=True)
-        self._expired = False
+        self._world.expired[self._number] = False
         self._lines.let_go(False)
 
     def close(self) -> None:
@@ -243,7 +243,7 @@ class EmulatedCard:
     def expire(self) -> None:
         """The watchdog expires: 0 V and no digital outputs, if that was asked for before it."""
         self._deadline = None
-        self._expired = True
+        self._world.expired[self._number] = True
         if self._expiration:
             self._world.volts[self._number] = 0.0
             self._lines.let_go(True)
@@ -258,7 +258,7 @@ class EmulatedCard:
         if self._world.failing:
             raise HILError(Code.HARDWARE, 'the board does not answer')
         self._world.catch_up()
-        if self._expired and not expired:
+        if self._world.expired[self._number] and not expired:
             raise HILError(Code.WATCHDOG_EXPIRED, 'the watchdog has expired')
 
 

@@ -8,6 +8,7 @@ from typing import ClassVar
 
 from diagnostic_msgs.msg import DiagnosticStatus
 
+from maglev_hw_bridge.doubts import doubts
 from maglev_hw_bridge.encoders import HomingError
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.stage import BridgeStage, Mode
@@ -41,14 +42,16 @@ def _make_stage(parameters: BridgeNodeParameters) -> BridgeStage:
 class BridgeNode(StageNode[BridgeNodeParameters, BridgeStage]):
     """Flies the stage on boards, whose clock paces the samples.
 
-    Configure opens and checks the boards, activate arms their watchdog and enables the amplifiers
-    at zero current, deactivate lands softly first, cleanup closes the boards.
+    Configure opens and checks the boards, ``~/home`` gives the encoders their zeros, activate arms
+    the watchdog and enables the amplifiers at zero current, deactivate lands softly first, cleanup
+    closes the boards.
     """
 
     interface: ClassVar[Mapping[str, str]] = {
         **StageNode.interface,
         TRUE_STATE: 'published with emulated boards: the true state of the emulated stage',
-        '~/home': 'std_srvs/Trigger: find the zeros of the encoders, the platen on its stops',
+        '~/home': 'std_srvs/Trigger: find the zeros of the encoders, the platen at rest on its'
+        ' lower stop at homing.x, homing.z; it is lifted a little to find out whether that is so',
         '~/land': 'std_srvs/Trigger: land without the controller',
     }
 
@@ -58,6 +61,24 @@ class BridgeNode(StageNode[BridgeNodeParameters, BridgeStage]):
         self.offer('~/home', self._home)
         self.offer('~/land', self._land)
         self.create_timer(_LOAD_PERIOD, self._watch_load, clock=self.steady_clock)
+
+    def configure(self) -> None:
+        """Get hold of the boards; what is doubtful about them, or came before, is said."""
+        super().configure()
+        for doubt in doubts(self.parameters):
+            self.get_logger().warning(doubt)
+        self._say_fault('latched since before')
+
+    def deactivate(self) -> None:
+        """Land, disable the amplifiers; boards that fail at it are a fault."""
+        before = self.stage.mode
+        super().deactivate()
+        if self.stage.mode is Mode.LOST is not before:
+            self._say_fault('fault while deactivated')
+
+    def _say_fault(self, when: str) -> None:
+        if self.stage.fault is not None:
+            self.get_logger().error(f'{when}: {self.stage.fault}')
 
     def _home(self) -> tuple[bool, str]:
         try:

@@ -174,6 +174,13 @@ class BridgeParameters:
                 f"parameter 'fault.command_limit' is {self.fault.command_limit:g} A, it must be at "
                 f"least 'amplifier.continuous_current' ({self.amplifier.continuous_current:g} A)"
             )
+        landing = self.landing
+        longest = landing.braking_time + landing.descent_time + landing.settle_time
+        if self.boards.stop_time < longest:
+            raise ParameterError(
+                f"parameter 'boards.stop_time' is {self.boards.stop_time:g} s, a landing takes "
+                f'{longest:g} s'
+            )
         if self.homing.at_start and self.driver != 'emulated':
             raise ParameterError(
                 f"parameter 'homing.at_start' is true with driver '{self.driver}': only an emulated"

@@ -7,21 +7,16 @@ current is cut. Either is latched until :meth:`reset`.
 
 from __future__ import annotations
 
-import contextlib
-import enum
-import time
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from maglev_hw_bridge import amplifiers, faults, guard
-from maglev_hw_bridge.amplifiers import Amplifiers
-from maglev_hw_bridge.drivers import Driver, DriverError, Truthful, WatchdogError, make_driver
-from maglev_hw_bridge.encoders import Encoders, HomingError
-from maglev_hw_bridge.guard import Guard
+from maglev_hw_bridge.drivers import Driver, DriverError, Truthful
 from maglev_hw_bridge.landing import Landing
+from maglev_hw_bridge.life_cycle import StageLife
+from maglev_hw_bridge.mode import Mode as Mode
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_model.stage import (
     STOP_REMEDY,
@@ -38,18 +33,7 @@ _ON_THE_STOP = 2e-4  # this near the lower stop the platen rests [m],
 _AT_REST = 0.02  # when it is slower than this [m/s]
 
 
-class Mode(enum.Enum):
-    """What the bridge does."""
-
-    CLOSED = 'closed'
-    READY = 'boards open, outputs at 0 V'
-    FOLLOWING = 'following the controller'
-    LANDING = 'landing by itself'
-    DISABLED = 'no current'
-    LOST = 'the boards are lost'
-
-
-class BridgeStage:
+class BridgeStage(StageLife):
     """The :class:`~maglev_model.stage.Stage` on boards, one sample per :meth:`read`."""
 
     paced = True
@@ -63,29 +47,15 @@ class BridgeStage:
         driver: Driver | None = None,
     ) -> None:
         """Raises StageError when the driver is not there, ParameterError when there is none."""
-        self.parameters = parameters or BridgeParameters()
-        self.sample_time = self.parameters.sample_time
-        self.realtime = realtime
-        self.mode = Mode.CLOSED
-        self.fault: Fault | None = None
-        self.why = ''
+        super().__init__(parameters or BridgeParameters(), realtime, driver)
         self.late_ticks = 0
-        try:
-            self.driver = driver or make_driver(self.parameters, realtime)
-        except DriverError as error:
-            raise StageError(str(error)) from error
         self._all_knowing = self.driver if isinstance(self.driver, Truthful) else None
-        self.encoders = Encoders(self.parameters)
-        self.amplifiers = Amplifiers(self.parameters)
-        self.guard = Guard(self.parameters)
         self.landing = Landing(self.parameters)
-        self._counts = np.zeros(6, dtype=np.int32)
         self._zero = np.zeros(4)
-        self._direct, self._quadrature = np.zeros(4), np.zeros(4)
-        self.flying = False  # current flows
-        self._age = 0  # of the last fresh currents, in samples since what they answer
         self._lower_stop = self.parameters.machine.gap_max
-        self._stale_samples = round(self.parameters.fault.stale / self.parameters.sample_time)
+        self._stale_samples = round(self.parameters.fault.stale / self.sample_time)
+        self._longest_stop = round(self.parameters.boards.stop_time / self.sample_time)
+        self._landing_samples = 0
         self._warm_up()
 
     @classmethod
@@ -106,83 +76,6 @@ class BridgeStage:
         self.amplifiers.drive(self._zero, self._zero, 0.0, 0.0)
         faults.consequence_of_cut(self.parameters, self.guard)
         self.guard.forget()
-
-    # -- states ------------------------------------------------------------------------------------
-
-    def configure(self) -> None:
-        """Open and check the boards, read the encoders, home when that is wanted at the start."""
-        try:
-            self.driver.open()
-            self.driver.counts(self._counts)
-        except DriverError as error:
-            self.driver.close()
-            raise StageError(str(error)) from error
-        self.encoders.start(self._counts)
-        self.mode = Mode.READY
-        if self.parameters.homing.at_start:
-            try:
-                self.home()
-            except HomingError as error:
-                self.close()
-                raise StageError(f'homing refused: {error}') from error
-
-    def activate(self) -> None:
-        """Arm the watchdog and enable the amplifiers at zero current. Raises StageError."""
-        if self.mode is not Mode.READY:
-            raise StageError(f'cannot be activated: {self.mode.value}')
-        self._check_encoders()
-        with self._or_drop_boards():
-            self.driver.start()
-        self.amplifiers.cut()
-        self.guard.forget()
-        self.flying, self._age = False, 0
-        self.mode = Mode.FOLLOWING if self.fault is None else Mode.DISABLED
-
-    def _check_encoders(self) -> None:
-        """Refuse encoders that read what the stops do not let the platen be."""
-        self._peek(self._counts)
-        self.encoders.decode(self._counts)
-        beyond = self.encoders.beyond_stops()
-        if beyond:
-            raise StageError(f'{beyond}: home first (~/home)')
-
-    def deactivate(self) -> None:
-        """Disable the amplifiers and the watchdog; :meth:`land` first. Raises StageError."""
-        if self.mode not in (Mode.FOLLOWING, Mode.LANDING, Mode.DISABLED):
-            return
-        self.amplifiers.cut()
-        self.flying = False
-        with self._or_drop_boards():
-            self.driver.stop()
-        self.mode = Mode.READY
-
-    def close(self) -> None:
-        """Release the boards with outputs at 0 V; may be called twice."""
-        self.flying = False
-        if self.mode is not Mode.CLOSED:
-            self.mode = Mode.CLOSED
-            self.amplifiers.cut()
-            self.driver.close()
-
-    def home(self) -> FloatArray:
-        """Define the encoders' zeros: the platen rests at its home position.
-
-        Returns by how much each zero moved (6,) [m]. Raises HomingError, StageError.
-        """
-        if self.mode is not Mode.READY:
-            raise HomingError(f'the boards must be open and the stage inactive: {self.mode.value}')
-        readings = np.zeros((self.parameters.homing.samples, 6), dtype=np.int32)
-        for row in readings:
-            self._peek(row)
-            if self.realtime:
-                time.sleep(self.parameters.sample_time)
-        shift = self.encoders.home(readings)
-        self.guard.forget()
-        return shift
-
-    def _peek(self, counts: NDArray[np.int32]) -> None:
-        with self._or_drop_boards():
-            self.driver.counts(counts)
 
     # -- samples -----------------------------------------------------------------------------------
 
@@ -282,7 +175,10 @@ class BridgeStage:
 
     def _descend(self) -> None:
         state = self.guard.arrays
-        if self.landing.step(state.position, state.rate):
+        self._landing_samples += 1
+        stopping = self.fault is not None and self.fault.kind == 'stop'
+        too_long = stopping and self._landing_samples > self._longest_stop
+        if self.landing.step(state.position, state.rate) or too_long:
             self._disable()
             return
         x, z = state.believed[4], state.believed[5]
@@ -306,62 +202,17 @@ class BridgeStage:
         """Latch a fault with that reason; lands while everything needed for that is sound."""
         self._raise_fault(kind, why, remedy)
 
-    def resume(self) -> None:
-        """Follow the controller again after a landing without a fault."""
-        if self.mode is Mode.DISABLED and self.fault is None:
-            self.mode, self.why, self._age = Mode.FOLLOWING, '', 0
-
-    def reset(self) -> tuple[bool, str]:
-        """Clear the latched fault if its cause is gone; whether it was, and what to know."""
-        if self.fault is None:
-            resumed = self.mode is Mode.DISABLED
-            self.resume()
-            return resumed, 'follows the controller again' if resumed else 'there is no fault'
-        if self.mode is Mode.LANDING:
-            return False, 'still landing: reset when the platen rests'
-        if self.mode is Mode.LOST:
-            remaining = self._restart()
-        else:
-            pressed = self.driver.stop_pressed
-            remaining = faults.remaining_cause(
-                self.parameters, pressed, self.guard, self.amplifiers
-            )
-        if remaining:
-            return False, f'the cause is still there: {remaining}'
-        cleared, self.fault = self.fault, None
-        self._direct[:] = self._quadrature[:] = 0.0
-        self.guard.forget()
-        self.resume()
-        return True, f'cleared: {cleared.reason}'
-
-    def _restart(self) -> str:
-        """Bring lost boards back: closed, opened, checked, started; what went wrong."""
-        self.driver.close()
-        self.mode = Mode.CLOSED
-        homed, total = self.encoders.homed, self.encoders.arrays.total.copy()
-        try:
-            self.driver.open()
-            self.driver.counts(self._counts)
-            self.encoders.decode(self._counts)
-            self.mode = Mode.READY
-            self.activate()
-        except (DriverError, StageError) as error:
-            self.driver.close()
-            self.mode = Mode.LOST
-            return str(error)
-        self.encoders.homed = homed and bool(np.any(self.encoders.arrays.total) or not total.any())
-        return ''
-
     def _raise_fault(self, kind: str, reason: str, remedy: str, cut: bool = False) -> None:
         if self.fault is not None and not (cut and self.mode is Mode.LANDING):
             return
-        if cut and self.flying:
-            reason += faults.consequence_of_cut(self.parameters, self.guard)
+        if cut:
+            flying = self.flying
+            self._disable()
+            if flying:
+                reason += faults.consequence_of_cut(self.parameters, self.guard)
         self.fault = Fault(kind, reason, remedy, cut)
         self.why = kind
-        if cut:
-            self._disable()
-        elif self.mode is Mode.FOLLOWING:
+        if self.mode is Mode.FOLLOWING:
             self._begin_landing()
 
     def _begin_landing(self) -> None:
@@ -369,14 +220,8 @@ class BridgeStage:
         if not self.flying or self._on_the_stop():
             self._disable()
             return
-        self.mode = Mode.LANDING
+        self.mode, self._landing_samples = Mode.LANDING, 0
         self.landing.begin(state.position, state.rate)
-
-    def _disable(self) -> None:
-        self.mode = Mode.DISABLED
-        self.flying = False
-        self._direct[:] = self._quadrature[:] = 0.0
-        self.amplifiers.cut()
 
     def _sensing_fault(self, code: int, index: int) -> None:
         if code in (guard.RANGE, guard.GAP_RANGE):
@@ -393,23 +238,3 @@ class BridgeStage:
         self.late_ticks += 1
         if self.flying and self.driver.late > self.parameters.boards.overrun:
             self._raise_fault('overrun', *faults.overrun_fault(self.driver.late))
-
-    def _lose_boards(self, error: DriverError) -> StageError:
-        kind = 'watchdog' if isinstance(error, WatchdogError) else 'board'
-        self._raise_fault(kind, str(error), 'see to the boards', cut=True)
-        self._drop_boards()
-        return StageError(str(error))
-
-    @contextlib.contextmanager
-    def _or_drop_boards(self) -> Iterator[None]:
-        """Where the boards fail outside of a sample they are given up. Raises StageError."""
-        try:
-            yield
-        except DriverError as error:
-            self._drop_boards()
-            raise StageError(str(error)) from error
-
-    def _drop_boards(self) -> None:
-        self.driver.close()
-        self.mode = Mode.LOST
-        self.flying = False

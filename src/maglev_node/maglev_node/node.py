@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import os
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -20,7 +19,7 @@ from rclpy.time_source import CLOCK_TOPIC
 
 from maglev_model import parameters as table
 from maglev_model.parameters import ParameterError, parameter
-from maglev_node import ros_parameters
+from maglev_node import realtime, ros_parameters
 from maglev_node.polling import PollingNode
 from maglev_node.topics import CLOCK, DIAGNOSTICS
 
@@ -85,6 +84,7 @@ class MaglevNode(PollingNode, Generic[P]):
         self._finished: Future = Future()
         self.exit_code: int | None = None
         self.came_up = time.monotonic()
+        self._said_refused = False
         self._diagnostics = self.create_publisher(DiagnosticArray, DIAGNOSTICS, 10)
         self.create_timer(1.0, self._publish_diagnostics, clock=self.steady_clock)
         if self.parameters.effective_parameters:
@@ -111,28 +111,31 @@ class MaglevNode(PollingNode, Generic[P]):
     def close(self) -> None:
         """What must happen last; publishers still work. Must be quick and must not raise."""
 
+    def rescue(self) -> None:
+        """What cannot wait until :meth:`close` when a callback has raised; must not raise."""
+
     def take_realtime_priority(self) -> None:
-        """In real time, put all threads of this process under SCHED_FIFO, where permitted.
+        """In real time, take SCHED_FIFO for all threads and lock the memory, where permitted.
 
         For nodes with :class:`SourceParameters`, when their publishers and subscriptions exist, so
-        that the middleware's threads do too.
+        that the middleware's threads do too. What is not permitted is said once.
         """
         parameters: Any = self.parameters
         if parameters.mode != 'realtime' or parameters.realtime_priority == 0:
             return
-        try:
-            for thread in os.listdir('/proc/self/task'):
-                scheduling = os.sched_param(parameters.realtime_priority)
-                os.sched_setscheduler(int(thread), os.SCHED_FIFO, scheduling)
-        except OSError:
-            self.get_logger().warning(
-                'real-time priority is not permitted (see ulimit -r): samples may come late'
-            )
+        refused = []
+        if not realtime.take_priority(parameters.realtime_priority):
+            refused.append('real-time priority (see ulimit -r)')
+        if not realtime.lock_memory():
+            refused.append('locking memory (see ulimit -l)')
+        if refused and not self._said_refused:
+            self._said_refused = True
+            self.get_logger().warning(f'not permitted: {", ".join(refused)}: samples may come late')
 
     def may_stop(self) -> bool:
         """Whether a signal may end the process now; asked again and again until it may.
 
-        A second signal ends it anyhow.
+        After a second signal it is asked only once more.
         """
         return True
 
@@ -181,6 +184,9 @@ class MaglevNode(PollingNode, Generic[P]):
         try:
             while not self._finished.done() and not stop():
                 executor.spin_until_future_complete(self._finished, timeout_sec=_SPIN_BOUND)
+        except Exception:
+            self.rescue()
+            raise
         finally:
             executor.remove_node(self)
             executor.shutdown()

@@ -25,17 +25,22 @@ _DELIVERY_TIME = 0.5
 
 _BACKGROUND_NICENESS = 5
 
+_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
 
 def run(make_node: Callable[[], MaglevNode[Any]], name: str) -> int:
     """Run one node to its end and return the exit code of the process.
 
-    SIGINT and SIGTERM end it in order, which is exit code 0 unless the node says otherwise:
-    :meth:`MaglevNode.close` runs and can still publish. A second signal does not wait for
-    :meth:`MaglevNode.may_stop`.
+    SIGINT, SIGTERM and SIGHUP (unless ignored, as by nohup) end it in order, which is exit code 0
+    unless the node says otherwise: :meth:`MaglevNode.close` runs and can still publish. After a
+    second signal :meth:`MaglevNode.may_stop` is not asked again until it agrees; what it does
+    before it answers, such as a landing, no signal cuts short.
     What the user did wrong is one line on stderr; a defect shows its traceback.
     """
     caught: list[int] = []
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in _ENDING:
+        if number == signal.SIGHUP and signal.getsignal(number) == signal.SIG_IGN:
+            continue
         signal.signal(number, lambda signum, _frame: caught.append(signum))
     node: MaglevNode[Any] | None = None
     prepare_middleware()
@@ -45,7 +50,7 @@ def run(make_node: Callable[[], MaglevNode[Any]], name: str) -> int:
         gc.collect()
         gc.freeze()
         running = node
-        node.spin(lambda: len(caught) > 1 or bool(caught and running.may_stop()))
+        node.spin(lambda: bool(caught) and (running.may_stop() or len(caught) > 1))
     except (NodeError, ParameterError) as error:
         print(f'{name}: error: {error}', file=sys.stderr, flush=True)
         return 1

@@ -121,6 +121,7 @@ class Sampling(Generic[P, S]):
             lost, self._lost = self._lost, False
             if lost and self._timer is not None:
                 self.answered = False
+                self._timer.reset()
                 self._advance()
         return success, message
 
@@ -181,7 +182,7 @@ class Sampling(Generic[P, S]):
             if self._lost or not pace.again(self.sequence, taken, stage.late):
                 break
         wait = pace.wait(stage.late + time.monotonic() - self._sample_time)
-        if wait is not None and self._timer is not None:
+        if wait is not None and self._timer is not None and not self._lost:
             self._timer.timer_period_ns = int(1e9 * wait)
             self._timer.reset()
 
@@ -289,6 +290,8 @@ class Sampling(Generic[P, S]):
     def _lose(self, error: StageError) -> None:
         """The stage cannot go on: that ends the node, unless a reset can bring it back."""
         self._lost = True
+        if self._timer is not None:
+            self._timer.cancel()
         if not self.stage.restartable:
             self._node.fail(str(error))
 

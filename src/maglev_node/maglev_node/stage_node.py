@@ -86,11 +86,11 @@ class StageNode(ManagedNode[P], Generic[P, S]):
     # -- life cycle --------------------------------------------------------------------------------
 
     def configure(self) -> None:
-        """Get hold of the stage and take its place on the graph."""
+        """Take its place on the graph, then get hold of the stage."""
         stage = self._make_stage(self.parameters)
+        self._graph.claim(MEASUREMENT, 'stage')
         try:
             stage.configure()
-            self._graph.claim(MEASUREMENT, 'stage')
         except Exception:
             stage.close()
             raise
@@ -118,6 +118,16 @@ class StageNode(ManagedNode[P], Generic[P, S]):
         if self.state == 'active':
             self.sampling.land('shut down')
         return True
+
+    def rescue(self) -> None:
+        """Land, where that still works, before a defect ends the node."""
+        if self._sampling is None:
+            return
+        try:
+            self._sampling.land('a defect of the node')
+        except Exception as error:
+            self.get_logger().fatal(f'no landing: {error!r}')
+            self._sampling.release()
 
     def close(self) -> None:
         """No current flows, and the stage is released."""

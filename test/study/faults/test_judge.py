@@ -58,9 +58,7 @@ def test_2_a_landing_that_is_cut(flown: Flown, monkeypatch: pytest.MonkeyPatch) 
     assert verdict.impact > 0.05
 
 
-def test_2_a_cut_that_is_foretold_too_mildly(
-    flown: Flown, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_2_a_cut_that_is_foretold_too_mildly(flown: Flown, monkeypatch: pytest.MonkeyPatch) -> None:
     dead_board = Fault('call: persistent', (0,), call='write_analog')
     assert 2 not in broken(flown(dead_board, 'ellipse', 0.5))
     mild = '; the platen strikes the upper stop at about 0.01 m/s'

@@ -84,6 +84,7 @@ class EmulatedBoards:
         self.stuck = np.zeros(6, dtype=bool)
         self.failing = False
         self.lines = Lines(parameters)
+        self.expired = np.zeros(2, dtype=bool)
         self._held = self.rig.counts()
         self.past = np.zeros((parameters.boards.buffer + 2, 18))
         self._delay = 0

@@ -42,7 +42,7 @@ KINDS: dict[str, Kind] = {
         stopped(),
         operator('signal once', lambda run, fault: run.flight.bridge.signal(1)),
         operator('signal twice', lambda run, fault: run.flight.bridge.signal(2)),
-        operator('hang-up', lambda run, fault: run.flight.bridge.vanish()),
+        operator('hang-up', lambda run, fault: run.flight.bridge.signal(1)),
         operator('kill', lambda run, fault: run.flight.bridge.vanish(), CUT),
         operator(
             'stop service',

@@ -57,8 +57,9 @@ class Bridge:
         self.sequence = -1
         self.lost = False
         self._watch = ControllerWatch()
-        self._signals: list[int] = []
+        self._signals = 0
         self._looks = 0
+        self._rescued = False
         self._finally: Callable[[], None] | None = None  # when it has landed by itself
 
     # -- life cycle --------------------------------------------------------------------------------
@@ -107,8 +108,8 @@ class Bridge:
         self.alive = self.active = False
 
     def signal(self, times: int) -> None:
-        """SIGINT or SIGTERM, so often before the process looks."""
-        self._signals += [2] * times
+        """SIGINT, SIGTERM or SIGHUP, so often before the process looks."""
+        self._signals += times
 
     @property
     def ending(self) -> bool:
@@ -148,7 +149,8 @@ class Bridge:
         """One sample: read, then follow the newest currents; what is measured, where it was."""
         self._looks += 1
         if self._signals and (not self.active or self._looks % _POLL == 0):
-            self._heed_signals()
+            self._signals = 0
+            self.end()
         if self._finally is not None and (self.lost or not self.stage.flying):
             last, self._finally = self._finally, None
             last()
@@ -161,14 +163,6 @@ class Bridge:
         self.sequence += 1
         self._answer(inbox)
         return read[0]
-
-    def _heed_signals(self) -> None:
-        several = len(self._signals) > 1
-        self._signals.clear()
-        if several:
-            self.die()
-        else:
-            self.end()
 
     def _answer(self, inbox: list[Answer]) -> None:
         """Follow the newest currents that are to be followed; none while it ends."""
@@ -213,9 +207,11 @@ class Bridge:
             return False
         except Exception as error:
             self.stray = self.stray or repr(error)
-            if self.alive:
-                self.alive = self.active = False
-                self._try(self.stage.close)
+            if self._rescued:
+                self.vanish()
+            elif self.alive:
+                self._rescued = True
+                self._land_then('a defect of the node', self.die)
             return False
         return True
 

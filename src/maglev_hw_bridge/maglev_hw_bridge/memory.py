@@ -1,0 +1,142 @@
+"""What must outlast the process that drives the boards, and that there is only one.
+
+A small file keeps the amplifiers' I²t load and a latched fault. While a bridge is active it says
+only that: what ends without stopping, killed or without power, is a fault when it comes back, with
+the amplifiers at full load. Written when the bridge is activated, deactivated, reset and closed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import json
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import IO, Any, NamedTuple
+
+import numpy as np
+
+from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.signal_parameters import PHASES
+from maglev_model.axes import FloatArray
+from maglev_model.stage import Fault, StageError
+
+_FULL = 1.0  # I²t load of a phase that nobody knows anything about
+_SEE = 'see to the machine and its amplifiers'
+
+
+class Kept(NamedTuple):
+    """What is known of the time before."""
+
+    load: FloatArray  # I²t load of the phases by now, (12,)
+    fault: Fault | None
+
+
+def memory_file(parameters: BridgeParameters) -> Path | None:
+    """Where it is kept; None: nowhere, as by default with emulated boards."""
+    boards = parameters.boards
+    if boards.memory:
+        return Path(boards.memory).expanduser()
+    if parameters.driver == 'emulated':
+        return None
+    state = Path(os.environ.get('XDG_STATE_HOME') or Path.home() / '.local' / 'state')
+    name = '-'.join([boards.type, *boards.identifier]).replace(os.sep, '_')
+    return state / 'maglev-stage' / f'{name}.json'
+
+
+class Memory:
+    """The file of one pair of boards. ``clock`` tells the time of day [s]."""
+
+    def __init__(
+        self, parameters: BridgeParameters, clock: Callable[[], float] = time.time
+    ) -> None:
+        self._path = memory_file(parameters)
+        self._thermal_time = parameters.amplifier.thermal_time
+        self._clock = clock
+        self._lock: IO[str] | None = None
+
+    def claim(self) -> None:
+        """Be the only one with these boards until :meth:`release`. Raises StageError."""
+        if self._path is None or self._lock is not None:
+            return
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            lock = self._path.with_name(self._path.name + '.lock').open('a')
+        except OSError as error:
+            raise self._unusable(error) from error
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            lock.close()
+            raise StageError(
+                f"the boards are in use: another bridge, or commissioning, holds '{lock.name}'"
+            ) from error
+        self._lock = lock
+
+    def release(self) -> None:
+        """Let others have the boards."""
+        if self._lock is not None:
+            self._lock.close()
+            self._lock = None
+
+    def recall(self) -> Kept:
+        """What is known; of what is not, the worst. Raises StageError."""
+        if self._path is None:
+            return Kept(np.zeros(PHASES), None)
+        unknown = np.full(PHASES, _FULL)
+        try:
+            text = self._path.read_text(encoding='utf-8')
+        except FileNotFoundError:
+            return Kept(unknown, None)
+        except (OSError, UnicodeDecodeError):
+            text = ''
+        try:
+            return self._understand(json.loads(text))
+        except (ValueError, TypeError, KeyError):
+            reason = f"what '{self._path}' kept of the last run is damaged"
+            return Kept(unknown, Fault('memory', reason, _SEE, True))
+
+    def _understand(self, content: dict[str, Any]) -> Kept:
+        if content['active']:
+            reason = 'the last run ended without stopping: killed, or the power failed'
+            return Kept(np.full(PHASES, _FULL), Fault('ended', reason, _SEE, True))
+        load = np.array(content['load'], dtype=np.float64)
+        if load.shape != (PHASES,) or not np.all((load >= 0.0) & np.isfinite(load)):
+            raise ValueError
+        passed = max(self._clock() - float(content['time']), 0.0)  # a clock set back cools nothing
+        given = content['fault']
+        fault = None
+        if given is not None:
+            kind, reason, remedy, cut = given
+            fault = Fault(str(kind), str(reason), str(remedy), bool(cut))
+        return Kept(load * np.exp(-passed / self._thermal_time), fault)
+
+    def keep(self, load: FloatArray, fault: Fault | None, *, active: bool) -> None:
+        """Write it, all or nothing. Raises StageError."""
+        if self._path is None:
+            return
+        content = {
+            'active': active,
+            'load': load.tolist(),
+            'time': self._clock(),
+            'fault': None if fault is None else list(fault),
+        }
+        new = self._path.with_name(self._path.name + '.new')
+        try:
+            with new.open('w', encoding='utf-8') as file:
+                json.dump(content, file)
+                file.flush()
+                os.fsync(file.fileno())
+            new.replace(self._path)
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                new.unlink()
+            raise self._unusable(error) from error
+
+    def _unusable(self, error: OSError) -> StageError:
+        return StageError(
+            f"what must outlast this process cannot be kept in '{self._path}': {error.strerror}; "
+            "let it be written there, or name another file by parameter 'boards.memory'"
+        )

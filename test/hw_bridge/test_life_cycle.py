@@ -1,0 +1,484 @@
+"""State x call: what every public call does in every mode, and what the outputs then are."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bridge_flight import HOME, Flight, hover
+
+from maglev_hw_bridge.drivers.emulated import EmulatedBoards
+from maglev_hw_bridge.drivers.quanser import QuanserDriver
+from maglev_hw_bridge.encoders import HomingError
+from maglev_hw_bridge.memory import Memory, memory_file
+from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.stage import BridgeStage, Mode
+from maglev_model.parameters import ParameterError, build
+from maglev_model.stage import Fault, StageError
+
+OFFSET = [0.3, -0.2] * 6  # what makes no current [V]
+WIRED = {
+    **HOME,
+    'boards.stop_input': 0,
+    'boards.enable_output': 1,
+    'amplifier.offset': OFFSET,
+    'emulation.wiring.offset': OFFSET,
+}
+LOWER_STOP, UPPER_STOP = 0.031, 0.018
+CALLS = (
+    'configure', 'home', 'activate', 'read', 'write', 'hold', 'land', 'stop', 'reset', 'resume',
+    'deactivate', 'close',
+)  # fmt: skip
+
+
+def bridge(**overrides: object) -> tuple[BridgeStage, EmulatedBoards]:
+    names = {name.replace('__', '.'): value for name, value in overrides.items()}
+    parameters = build(BridgeParameters, {**WIRED, **names})
+    boards = EmulatedBoards(parameters)
+    driver = QuanserDriver(parameters, boards, boards.now, boards.sleep)
+    return BridgeStage(parameters, driver=driver), boards
+
+
+def in_mode(mode: Mode) -> tuple[BridgeStage, EmulatedBoards]:
+    """A bridge in that mode; LANDING in the air, DISABLED and LOST with a fault."""
+    stage, boards = bridge()
+    if mode is Mode.CLOSED:
+        return stage, boards
+    stage.configure()
+    if mode is Mode.READY:
+        return stage, boards
+    stage.activate()
+    if mode is Mode.FOLLOWING:
+        return stage, boards
+    if mode is Mode.LANDING:
+        boards.rig.place(np.array([0.025, 0.0, 0.0, 0.0, 0.0]))
+        stage.guard.forget()
+        for _ in range(3):
+            stage.read()
+            stage.write(np.full(4, 0.6), np.zeros(4))
+        stage.stop()
+        assert stage.mode is Mode.LANDING
+        return stage, boards
+    if mode is Mode.DISABLED:
+        stage.stop()
+        assert stage.mode is Mode.DISABLED
+        return stage, boards
+    boards.failing = True
+    with pytest.raises(StageError):
+        stage.read()
+    boards.failing = False
+    return stage, boards
+
+
+def call(stage: BridgeStage, name: str) -> Any:
+    arguments = {'write': (np.zeros(4), np.zeros(4)), 'land': ('for a test',)}.get(name, ())
+    return getattr(stage, name)(*arguments)
+
+
+def no_current(boards: EmulatedBoards) -> bool:
+    volts = boards.volts[[0] * 6 + [1] * 6, [*range(6), *range(6)]]
+    expired = not boards.lines.enabled and not np.any(boards.volts)
+    return volts.tolist() == OFFSET or expired
+
+
+# The mode after a call, or the error it raises, by the mode before it.
+REFUSED = (StageError, HomingError)
+TABLE: dict[Mode, dict[str, Mode | tuple[type[Exception], ...]]] = {
+    Mode.CLOSED: {'configure': Mode.READY, 'home': REFUSED, 'activate': REFUSED, 'read': REFUSED},
+    Mode.READY: {'configure': REFUSED, 'activate': Mode.FOLLOWING, 'read': REFUSED},
+    Mode.FOLLOWING: {
+        'configure': REFUSED, 'home': REFUSED, 'activate': REFUSED, 'land': Mode.DISABLED,
+        'stop': Mode.DISABLED, 'deactivate': Mode.READY,
+    },
+    Mode.LANDING: {
+        'configure': REFUSED, 'home': REFUSED, 'activate': REFUSED, 'deactivate': Mode.READY,
+    },
+    Mode.DISABLED: {
+        'configure': REFUSED, 'home': REFUSED, 'activate': REFUSED, 'reset': Mode.FOLLOWING,
+        'deactivate': Mode.READY,
+    },
+    Mode.LOST: {
+        'configure': REFUSED, 'home': REFUSED, 'activate': REFUSED, 'read': REFUSED,
+        'reset': Mode.FOLLOWING,
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('name', CALLS)
+@pytest.mark.parametrize('mode', list(Mode))
+def test_every_call_in_every_mode(mode: Mode, name: str) -> None:
+    stage, boards = in_mode(mode)
+    expected = Mode.CLOSED if name == 'close' else TABLE[mode].get(name, mode)
+    if isinstance(expected, Mode):
+        call(stage, name)
+        assert stage.mode is expected
+    else:
+        with pytest.raises(expected):
+            call(stage, name)
+        assert stage.mode is mode
+    assert boards.lines.enabled == (stage.mode in (Mode.FOLLOWING, Mode.LANDING))
+    if stage.mode is not Mode.LANDING and stage.mode is not mode:
+        assert no_current(boards)
+    stage.close()
+    assert no_current(boards)
+    assert not boards.lines.enabled
+    assert not boards.cards
+
+
+@pytest.mark.parametrize('mode', list(Mode))
+def test_a_restart_works_from_every_mode(mode: Mode) -> None:
+    stage, boards = in_mode(mode)
+    stage.close()
+    boards.rig.place(np.array([LOWER_STOP, 0.0, 0.0, 0.0, 0.0]))
+    again = BridgeStage(stage.parameters, driver=stage.driver)
+    again.configure()
+    again.activate()
+    again.read()
+    again.close()
+
+
+@pytest.mark.parametrize('mode', [Mode.FOLLOWING, Mode.LANDING, Mode.DISABLED])
+def test_boards_that_fail_while_they_are_deactivated_are_a_fault(mode: Mode) -> None:
+    stage, boards = in_mode(mode)
+    boards.failing = True
+    stage.deactivate()
+    assert stage.mode is Mode.LOST
+    assert stage.fault is not None
+    assert no_current(boards)  # the watchdog has seen to that
+    assert not boards.lines.enabled
+    boards.failing = False
+    for card in list(boards.cards.values()):
+        card.close()
+    boards.rig.place(np.array([LOWER_STOP, 0.0, 0.0, 0.0, 0.0]))
+    cleared, _ = stage.reset()
+    assert cleared
+    assert stage.mode is Mode.READY  # an inactive stage is not enabled by a reset
+    assert not boards.lines.enabled
+    stage.activate()
+    assert boards.lines.enabled
+
+
+def test_lost_boards_of_a_stage_that_was_deactivated_since_are_not_enabled() -> None:
+    stage, boards = in_mode(Mode.LOST)
+    stage.deactivate()
+    assert stage.reset()[0]
+    assert stage.mode is Mode.READY
+    assert not boards.lines.enabled
+
+
+def unhome(stage: BridgeStage, _boards: EmulatedBoards) -> None:
+    stage.encoders.homed = False
+
+
+def press(_stage: BridgeStage, boards: EmulatedBoards) -> None:
+    boards.stop_pressed = True
+
+
+def heat(stage: BridgeStage, _boards: EmulatedBoards) -> None:
+    stage.amplifiers.arrays.load[11] = 50.0
+
+
+def shift_x(_stage: BridgeStage, boards: EmulatedBoards) -> None:
+    boards.jumps[4] += 20_000
+
+
+AGAINST: list[tuple[Callable[[BridgeStage, EmulatedBoards], None], str]] = [
+    (unhome, 'home first'),
+    (press, 'emergency stop is pressed'),
+    (heat, 'hot'),
+    (shift_x, 'encoder x reads'),
+]
+
+
+@pytest.mark.parametrize(('spoil', 'text'), AGAINST)
+def test_what_speaks_against_activation(
+    spoil: Callable[[BridgeStage, EmulatedBoards], None], text: str
+) -> None:
+    stage, boards = in_mode(Mode.READY)
+    spoil(stage, boards)
+    boards.tick()
+    with pytest.raises(StageError, match=text):
+        stage.activate()
+    assert stage.mode is Mode.READY
+    assert not boards.lines.enabled
+
+
+@pytest.mark.parametrize(('spoil', 'text'), AGAINST[1:])
+@pytest.mark.parametrize('mode', [Mode.DISABLED, Mode.LOST])
+def test_what_speaks_against_a_reset(
+    mode: Mode, spoil: Callable[[BridgeStage, EmulatedBoards], None], text: str
+) -> None:
+    stage, boards = in_mode(mode)
+    spoil(stage, boards)
+    if mode is Mode.DISABLED:
+        stage.read()
+        stage.hold()
+    else:
+        boards.tick()
+    cleared, why = stage.reset()
+    assert not cleared
+    assert text in why
+    assert stage.mode is mode
+    assert not boards.lines.enabled
+
+
+def test_counters_that_came_back_as_0_are_not_homed() -> None:
+    stage, boards = in_mode(Mode.FOLLOWING)
+    boards.rig.place(np.array([0.0305, 0.01, 0.0, 0.0, 0.0]))
+    boards.failing = True
+    with pytest.raises(StageError):
+        stage.read()
+    boards.failing = False
+    stage.encoders.arrays.total[:] = 7  # it counted before
+    boards.counters[:] = 0
+    boards.rig._start -= boards.rig.counts()
+    cleared, why = stage.reset()
+    assert not cleared
+    assert 'home first' in why
+    assert stage.mode is Mode.LOST
+    stage.deactivate()
+    assert stage.reset()[0]
+    with pytest.raises(StageError, match='home first'):
+        stage.activate()
+
+
+def test_unhomed_stays_unhomed_when_boards_come_back() -> None:
+    stage, _ = in_mode(Mode.LOST)
+    stage.deactivate()
+    stage.encoders.homed = False
+    assert stage.reset()[0]
+    assert not stage.encoders.homed
+
+
+@pytest.mark.parametrize('recover', ['reset', 'restart', 'deactivate'])
+def test_a_second_fault_after_every_recovery(recover: str) -> None:
+    """What was done about the first one leaves nothing behind that spoils the second."""
+    start = {'emulation.wiring.encoder_start': [100] * 6}
+    flight = Flight(hover(0.025), {'boards.enable_output': 1, **start})
+    for encoder in (1, 2):
+        flight.run(150)
+        assert flight.stage.mode is Mode.FOLLOWING, flight.stage.fault
+        flight.rig.forget_impact()
+        if recover == 'restart':
+            flight.boards.expire()
+            flight.run(1)
+            assert flight.stage.mode is Mode.LOST
+        else:
+            flight.stage.stop()
+            flight.until_no_current()
+            assert flight.rig.impact < 0.05, encoder
+            if recover == 'deactivate':
+                flight.stage.deactivate()
+        assert not flight.boards.lines.enabled
+        flight.rig.place(np.array([LOWER_STOP, 0.0, 0.0, 0.0, 0.0]))
+        cleared, why = flight.stage.reset()
+        assert cleared, why
+        if recover == 'deactivate':
+            flight.stage.activate()
+        flight.rig.place(flight.target(0.0)[0])
+        flight.stage.guard.forget()
+        flight.regulator.reset()
+
+
+@pytest.mark.parametrize('stage_kind', ['lower', 'upper', 'held'])
+def test_homing_tells_the_stops_apart(stage_kind: str) -> None:
+    stage, boards = bridge(homing__at_start=False)
+    place = {'upper': UPPER_STOP}.get(stage_kind, LOWER_STOP)
+    boards.rig.place(np.array([place, 0.0, 0.0, 0.0, 0.0]))
+    for _ in range(50):
+        boards.tick()
+    assert boards.rig.state[0] == pytest.approx(place, abs=1e-5)  # the magnets hold it there
+    stage.configure()
+    if stage_kind == 'held':
+        for phase in range(12):
+            boards.dead(phase)
+    if stage_kind == 'lower':
+        stage.home()
+        assert stage.encoders.homed
+        stage.activate()
+    else:
+        with pytest.raises(HomingError, match='put it on the lower one'):
+            stage.home()
+        assert not stage.encoders.homed
+        with pytest.raises(StageError):
+            stage.activate()
+    assert boards.rig.impact < 0.05
+    stage.close()
+
+
+def test_homing_by_word_only() -> None:
+    stage, boards = bridge(homing__at_start=False, homing__lift=0.0)
+    stage.configure()
+    ticks = boards.ticks
+    stage.home()
+    assert boards.ticks == ticks
+    assert stage.encoders.homed
+
+
+def test_real_boards_are_not_homed_at_the_start() -> None:
+    with pytest.raises(ParameterError, match=r'homing\.at_start.*lower stop'):
+        build(BridgeParameters, {'driver': 'quanser', 'homing.at_start': True})
+
+
+def test_an_emergency_stop_ends_the_landing_in_time() -> None:
+    times = {'boards.stop_time': 0.5, 'landing.braking_time': 0.1, 'landing.descent_time': 0.3}
+    times |= {'landing.settle_time': 0.05}
+    flight = Flight(hover(0.025), {**times, 'boards.enable_output': 1})
+    flight.run(150)
+    flight.stage.stop()
+    flight.stage.landing.arrays.descent_start = 60.0  # a landing that does not end
+    samples = 0
+    while flight.boards.lines.enabled:
+        flight.step(False)
+        samples += 1
+    assert samples == pytest.approx(500, abs=2)
+    assert flight.stage.mode is Mode.DISABLED
+    with pytest.raises(ParameterError, match=r'boards\.stop_time'):
+        build(BridgeParameters, {'boards.stop_time': 1.0})
+
+
+def test_a_cut_is_put_out_before_it_is_explained(monkeypatch: pytest.MonkeyPatch) -> None:
+    flight = Flight(hover(0.025), {'boards.enable_output': 1})
+    flight.run(150)
+    seen = []
+
+    def explain(*_: object) -> str:
+        seen.append((np.any(flight.boards.volts), flight.boards.lines.enabled))
+        return ''
+
+    monkeypatch.setattr('maglev_hw_bridge.faults.consequence_of_cut', explain)
+    flight.stage._raise_fault('encoder', 'for a test', 'nothing', cut=True)
+    assert seen == [(False, False)]
+
+
+# -- what outlasts the process -------------------------------------------------------------------
+
+
+def kept(path: Path, **overrides: object) -> BridgeStage:
+    return bridge(boards__memory=str(path), **overrides)[0]
+
+
+def cold(stage: BridgeStage) -> BridgeStage:
+    stage._cooling_since -= 60.0
+    return stage
+
+
+def test_emulated_boards_keep_nothing_and_real_ones_a_file(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv('XDG_STATE_HOME', str(tmp_path))
+    assert memory_file(BridgeParameters()) is None
+    real = memory_file(build(BridgeParameters, {'driver': 'quanser'}))
+    assert real == tmp_path / 'maglev-stage' / 'q8-0-1.json'
+
+
+def test_load_and_fault_outlast_the_process(tmp_path: Path) -> None:
+    path = tmp_path / 'state' / 'boards.json'
+    first = kept(path)
+    first.configure()
+    cold(first).activate()
+    first.stop('for a reason')
+    first.amplifiers.arrays.load[3] = 0.9
+    first.close()
+    second = kept(path)
+    second.configure()
+    assert second.fault == first.fault
+    assert 0.5 < second.amplifiers.load < 0.9
+    with pytest.raises(StageError, match='for a reason'):
+        second.activate()
+    cold(second)
+    assert second.reset()[0]
+    assert second.mode is Mode.READY
+    second.close()
+    third = kept(path)
+    third.configure()
+    assert third.fault is None
+    third.close()
+
+
+def test_what_is_killed_in_flight_is_a_fault_and_hot(tmp_path: Path) -> None:
+    path = tmp_path / 'boards.json'
+    first = kept(path)
+    first.configure()
+    cold(first).activate()
+    first.memory.release()  # as the system does for a process that is killed
+    second = kept(path)
+    second.configure()
+    assert second.fault is not None
+    assert second.fault.kind == 'ended'
+    assert second.amplifiers.load > 0.9
+    assert 'hot' in second.reset()[1]
+    assert cold(second).reset()[0]
+    second.activate()
+    second.close()
+
+
+@pytest.mark.parametrize(
+    'content',
+    ['', '{', '[]', '{"active": false}', '{"active": false, "load": [1], "time": 0, "fault": null}',
+     '{"active": false, "load": "hot", "time": 0, "fault": 3}', b'\xff\xfe',
+     '{"active": false, "load": [NaN,0,0,0,0,0,0,0,0,0,0,0], "time": 0, "fault": null}'],
+)  # fmt: skip
+def test_a_damaged_file_is_a_fault_and_hot(tmp_path: Path, content: str | bytes) -> None:
+    path = tmp_path / 'boards.json'
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    stage = kept(path)
+    stage.configure()
+    assert stage.fault is not None
+    assert 'damaged' in stage.fault.reason
+    assert stage.amplifiers.load > 0.9
+    assert cold(stage).reset()[0]
+    stage.close()
+    assert json.loads(path.read_text())['fault'] is None
+
+
+def test_without_a_file_the_amplifiers_count_as_hot(tmp_path: Path) -> None:
+    stage = kept(tmp_path / 'boards.json')
+    stage.configure()
+    assert stage.fault is None
+    with pytest.raises(StageError, match=r'hot.*for 0\.\d s'):
+        stage.activate()
+    cold(stage).activate()
+    stage.close()
+
+
+@pytest.mark.parametrize(('passed', 'left'), [(2.0, 0.5 * np.exp(-1.0)), (-3600.0, 0.5)])
+def test_the_wall_clock_cools_and_never_heats(tmp_path: Path, passed: float, left: float) -> None:
+    parameters = build(BridgeParameters, {'boards.memory': str(tmp_path / 'boards.json')})
+    now = 1000.0
+    memory = Memory(parameters, lambda: now)
+    memory.keep(np.full(12, 0.5), None, active=False)
+    now += passed
+    assert memory.recall().load == pytest.approx(np.full(12, left))
+
+
+def test_a_fault_is_kept_as_it_was(tmp_path: Path) -> None:
+    memory = Memory(build(BridgeParameters, {'boards.memory': str(tmp_path / 'boards.json')}))
+    fault = Fault('board', 'a "reason"\n', 'µ', True)
+    memory.keep(np.zeros(12), fault, active=False)
+    assert memory.recall().fault == fault
+    assert [path.name for path in tmp_path.iterdir()] == ['boards.json']
+
+
+def test_two_bridges_cannot_have_the_same_boards(tmp_path: Path) -> None:
+    path = tmp_path / 'boards.json'
+    first, second = kept(path), kept(path)
+    first.configure()
+    with pytest.raises(StageError, match='in use'):
+        second.configure()
+    assert not second.driver._boards[0].card  # type: ignore[attr-defined]
+    first.close()
+    second.configure()
+    second.close()
+
+
+def test_a_place_that_cannot_be_written_is_said(tmp_path: Path) -> None:
+    (tmp_path / 'file').write_text('')
+    stage = kept(tmp_path / 'file' / 'boards.json')
+    with pytest.raises(StageError, match=r"parameter 'boards\.memory'"):
+        stage.configure()
+    assert stage.mode is Mode.CLOSED
