@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from itertools import pairwise
 
 import pytest
 
@@ -58,7 +59,7 @@ def test_a_programme_has_all_phases_one_after_another(number: int) -> None:
     course = programme(number)
     spans = [course.spans[phase] for phase in PHASES[2:]]
     assert all(start < end for start, end in spans)
-    assert all(before[1] <= after[0] for before, after in zip(spans, spans[1:], strict=False))
+    assert all(before[1] <= after[0] for before, after in pairwise(spans))
     assert len(course.kind) == len(course.references.position) > spans[-1][1] + 2000
     for phase in PHASES:
         start, end = course.spans[phase]

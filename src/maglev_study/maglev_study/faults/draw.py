@@ -12,7 +12,7 @@ from maglev_study.faults.catalogue import KINDS
 from maglev_study.faults.fly import Scenario
 from maglev_study.faults.kinds import Fault
 
-PER_MACHINE = 120
+PER_MACHINE = 60
 """Runs that one machine's programme is flown for."""
 
 _LATEST = 500  # of a second fault after the first [samples]

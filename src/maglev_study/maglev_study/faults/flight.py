@@ -68,9 +68,9 @@ class Bridge:
         """Open the boards; whether that went well."""
         return self._try(self.stage.configure)
 
-    def home(self) -> bool:
-        """The service ~/home."""
-        self.homed = self._try(self.stage.home)
+    def home(self, *, vouched: bool = False) -> bool:
+        """The service ~/home; ``vouched``: without the lift that proves where the platen rests."""
+        self.homed = self._try(partial(self.stage.home, vouched))
         return self.homed
 
     def activate(self) -> bool:

@@ -221,7 +221,7 @@ class Course:
                 self.step()
         self.judge.may_enable = True
         bridge.cleanup()
-        if bridge.alive and bridge.configure() and bridge.home():
+        if bridge.alive and bridge.configure() and bridge.home(vouched=True):
             bridge.activate()
             for _ in range(3):
                 self.step()
@@ -237,7 +237,7 @@ class Course:
         judge.may_enable = True
         world.rest()
         bridge = Bridge(flight.parameters, world)
-        ready = bridge.configure() and bridge.home() and bridge.activate()
+        ready = bridge.configure() and bridge.home(vouched=True) and bridge.activate()
         if not ready:
             judge.blame(6, f'no restart: {bridge.refused or bridge.stray}')
         for _ in range(3):
