@@ -1,4 +1,4 @@
-"""Which small defects tests and fault campaign find: mutants of what keeps the platen from the stop.
+"""Which small defects tests and campaign find: mutants of what keeps the platen from the stop.
 
     python benchmarks/mutants.py [--most N] [--seed S] [--campaign N] [MODULE...]
 

@@ -17,6 +17,8 @@ DEGRADED = 0.05
 """One without an encoder, or with a failing amplifier, below this [m/s]."""
 CUT = None
 """The current may be cut: no faster than that was foretold."""
+NOTHING = '(?!)'
+"""What a reason must match where nothing failed: there must be none."""
 
 
 @dataclasses.dataclass(frozen=True)

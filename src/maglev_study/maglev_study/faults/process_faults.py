@@ -6,7 +6,7 @@ import numpy as np
 
 from maglev_model.controller_watch import Status
 from maglev_study.faults.flight import Answer, Bridge
-from maglev_study.faults.kinds import CUT, NOMINAL, Begin, Expected, Fault, Kind, Run
+from maglev_study.faults.kinds import CUT, NOMINAL, NOTHING, Begin, Expected, Fault, Kind, Run
 from maglev_study.faults.programme import BEFORE_THE_FIRST_SAMPLE, PHASES
 
 SAMPLING = tuple(phase for phase in PHASES if phase not in BEFORE_THE_FIRST_SAMPLE)
@@ -121,7 +121,7 @@ def operator(
     name: str,
     act: Begin,
     impact: float | None = NOMINAL,
-    blame: str = '',
+    blame: str = NOTHING,
     phases: tuple[str, ...] = PHASES,
     sizes: tuple[int, int] = (0, 0),
     seen: int | None = None,
