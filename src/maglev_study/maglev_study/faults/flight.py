@@ -300,7 +300,7 @@ class Flight:
     def step(self) -> None:
         """One sample passes."""
         if self.acting:
-            self._act(self.course.actions.get(self.samples))
+            self.act()
         if self.each is not None:
             self.each()
         ticks = self.world.ticks
@@ -323,7 +323,9 @@ class Flight:
             sequence, course.kind[row], 0, position[row], velocity[row], acceleration[row]
         )
 
-    def _act(self, action: str | None) -> None:
+    def act(self) -> None:
+        """What the operator does at this sample of the programme."""
+        action = self.course.actions.get(self.samples)
         supervisor = self.controller.supervisor
         if action == STOP:
             self.bridge.emergency_stop()

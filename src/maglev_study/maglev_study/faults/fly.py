@@ -49,6 +49,9 @@ class Course:
         self.judge.enable_counts = not any(
             fault.call == 'write_digital' and 'wrong' in fault.kind for fault in scenario.faults
         )
+        if scenario.phase not in ('after a fault', 'reset'):
+            flight.act()  # what is due at this very sample, and nothing later
+            flight.acting = False
         self.begun = [False] * len(scenario.faults)
         self.expected = expected_of(scenario.faults)
 

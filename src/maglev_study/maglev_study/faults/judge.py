@@ -54,6 +54,7 @@ class Judge:
         world = flight.world
         self.prior = flight.bridge.stage.fault
         self.seen: int | None = None  # tick of the new fault, or of a refusal
+        self.latched = 0  # ticks until which the prior fault stayed latched
         self.reason = ''
         self.cut_by_itself = False
         self.ended: int | None = None  # tick of the terminal state
@@ -92,6 +93,8 @@ class Judge:
     def after_step(self) -> None:
         """Look at the fault, once a sample."""
         fault = self.flight.bridge.stage.fault
+        if self.prior is not None and fault is self.prior:
+            self.latched = self._n
         if self.seen is None and fault is not None and fault is not self.prior:
             self.notice(fault.reason)
             self.cut_by_itself = fault.cut
@@ -173,8 +176,8 @@ class Judge:
         return min([*shows, *signs], default=None)
 
     def _judge_detection(self, expected: Expected, first: int | None) -> None:
-        if self.prior is not None and self.flight.bridge.stage.fault is self.prior:
-            return
+        if first is not None:
+            first = max(first, self.latched)
         until = self._n if self.ended is None else self.ended
         seen = self.seen if self.seen is not None else until
         wanted = first is not None and expected.seen is not None
