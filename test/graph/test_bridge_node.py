@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import signal
+import sys
 import time
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from graph import Nodes, Observer, Process
+from graph import PARAMS, Nodes, Observer, Process
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
+from std_srvs.srv import Trigger
 
 from maglev_msgs.msg import ControllerState, Currents
 from maglev_node.topics import (
@@ -175,14 +177,15 @@ def test_bad_parameters_are_one_clear_line(arguments: list[str], text: str, node
     assert 'Traceback' not in process.output
 
 
-def fly(nodes: Nodes, observer: Observer, mode: str = 'lockstep') -> dict[str, Process]:
+def fly(
+    nodes: Nodes, observer: Observer, mode: str = 'lockstep', stage: Process | None = None
+) -> dict[str, Process]:
     """Bridge, controller and reference on the ellipse, until it is airborne."""
     observer.watch(MEASUREMENT, REFERENCE, CURRENTS, CONTROLLER_STATE, TRUE_STATE)
     common = f'mode:={mode}', 'watchers:=[observer]'  # by the test
     graph = {
-        'stage': nodes.start(
-            'hw_bridge', *common, 'answer_timeout:=1.0', params=FILES['hw_bridge']
-        ),
+        'stage': stage
+        or nodes.start('hw_bridge', *common, 'answer_timeout:=1.0', params=FILES['hw_bridge']),
         'controller': nodes.start('controller', *common),
         'reference': nodes.start('reference', *common, 'duration:=600.0', params=(ELLIPSE,)),
     }
@@ -235,13 +238,61 @@ def test_deactivated_in_flight_it_lands_first(nodes: Nodes, observer: Observer) 
     life = Life(observer, 'hw_bridge')
     assert life.change(Transition.TRANSITION_DEACTIVATE)
     observer.wait(lambda: height(observer) > LOWER_STOP - 1e-5)
-    gaps = np.array([np.mean(message.gap) for message in observer.messages[MEASUREMENT]])
-    assert np.max(np.abs(np.diff(gaps[-2000:]))) < 5e-5  # 0.05 m/s
+    assert landed_softly(observer)
     assert 'fault' not in graph['stage'].output
 
 
-def test_stopped_in_flight_it_lands_first(nodes: Nodes, observer: Observer) -> None:
+def landed_softly(observer: Observer) -> bool:
+    gaps = np.array([np.mean(message.gap) for message in observer.messages[MEASUREMENT]])
+    return bool(np.max(np.abs(np.diff(gaps[-2000:]))) < 5e-5)  # 0.05 m/s
+
+
+@pytest.mark.parametrize(
+    'signals',
+    [
+        (signal.SIGINT,),
+        (signal.SIGHUP,),
+        (signal.SIGINT, signal.SIGINT),
+        (signal.SIGINT, signal.SIGTERM),
+    ],
+)
+def test_stopped_in_flight_it_lands_first(
+    signals: tuple[signal.Signals, ...], nodes: Nodes, observer: Observer
+) -> None:
     graph = fly(nodes, observer)
-    graph['stage'].signal(signal.SIGINT)
+    for number in signals:
+        graph['stage'].signal(number)
+        time.sleep(0.01)
     assert graph['stage'].wait() == 0
     observer.wait(lambda: height(observer) > LOWER_STOP - 1e-5)
+    assert landed_softly(observer)
+
+
+BREAKING = """
+from maglev_hw_bridge.node import BridgeNode
+from maglev_node.process import main
+
+class Breaking(BridgeNode):
+    def __init__(self):
+        super().__init__()
+        self.offer('~/break', self._break)
+
+    def _break(self):
+        raise RuntimeError('a defect')
+
+main(Breaking, 'hw_bridge')
+"""
+
+
+def test_a_callback_that_raises_lands_it(nodes: Nodes, observer: Observer) -> None:
+    file = str(PARAMS / 'hw_bridge.yaml')
+    arguments = ['--ros-args', '--params-file', file, '-p', 'watchers:=[observer]']
+    program = [sys.executable, '-c', BREAKING, *arguments]
+    graph = fly(nodes, observer, stage=nodes.run('hw_bridge', program))
+    client = observer.node.create_client(Trigger, '/hw_bridge/break')
+    observer.wait(client.service_is_ready)
+    client.call_async(Trigger.Request())
+    assert graph['stage'].wait() == 70
+    assert 'a defect' in graph['stage'].output
+    observer.wait(lambda: height(observer) > LOWER_STOP - 1e-5)
+    assert landed_softly(observer)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,11 +10,15 @@ import pytest
 import yaml
 from bridge_flight import HOME
 
-from maglev_hw_bridge.commission import Commissioning, WrongError, run
+from maglev_hw_bridge.commission import Commissioning, run
 from maglev_hw_bridge.diagnosis import _explanations, diagnose
 from maglev_hw_bridge.drivers.emulated import EmulatedBoards
 from maglev_hw_bridge.drivers.quanser import QuanserDriver
+from maglev_hw_bridge.emulated_card import EmulatedCard
+from maglev_hw_bridge.memory import Memory
+from maglev_hw_bridge.operators import EmulatedPerson
 from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.proof import Proof, WrongError
 from maglev_hw_bridge.response import Twins
 from maglev_model.parameters import build
 
@@ -43,13 +47,15 @@ def commission(claimed: dict[str, object]) -> tuple[list[str], EmulatedBoards]:
     parameters = build(BridgeParameters, {**HOME, **claimed})
     boards = EmulatedBoards(build(BridgeParameters, {**HOME, **claimed, **OTHER_MACHINE}))
     told: list[str] = []
-    driver = QuanserDriver(parameters, boards, boards.now)
-    steps = Commissioning(parameters, driver, peak=PEAK, ask=told.append, tell=told.append)
+    driver = QuanserDriver(parameters, boards, boards.now, boards.sleep)
+    operator = EmulatedPerson(boards, told.append)
+    steps = Commissioning(parameters, driver, peak=PEAK, operator=operator, tell=told.append)
     try:
         steps.run()
     finally:
         assert not np.any(boards.volts)
         assert not boards.cards
+        assert boards.lines.enabled == (parameters.boards.enable_output < 0)
     return told, boards
 
 
@@ -158,3 +164,98 @@ def test_it_asks_and_takes_no_for_an_answer(
     monkeypatch.setattr('builtins.input', answer)
     assert run(['--params', str(PARAMS)]) == 130
     assert 'stopped' in capsys.readouterr().err
+
+
+LINES = {'boards.stop_input': 0, 'boards.enable_output': 1}
+
+
+def prove(claimed: dict[str, object], spoil: Callable[[EmulatedBoards], None]) -> list[str]:
+    """Prove the last line of a machine with both lines."""
+    parameters = build(BridgeParameters, {**LINES, **claimed})
+    boards = EmulatedBoards(parameters)
+    spoil(boards)
+    driver = QuanserDriver(parameters, boards, boards.now, boards.sleep)
+    told: list[str] = []
+    driver.open()
+    try:
+        Proof(parameters, driver, EmulatedPerson(boards, told.append), told.append).run()
+    finally:
+        driver.close()
+        assert not np.any(boards.volts)
+    return told
+
+
+def nothing(_boards: EmulatedBoards) -> None:
+    """A machine that is right."""
+
+
+def test_the_last_line_is_proven() -> None:
+    told = prove({}, nothing)
+    assert [line.split(':')[0].strip() for line in told] == [
+        'stop input', 'enable line', 'watchdog', 'emergency stop',
+    ]  # fmt: skip
+    assert all(line.endswith('pass') for line in told)
+    told = prove({'boards.stop_input': -1, 'boards.enable_output': -1}, nothing)
+    assert 'no emergency stop to prove' in told[0]
+    assert 'no enable line to prove' in told[1]
+
+
+@pytest.mark.parametrize(
+    ('claimed', 'text'),
+    [
+        ({'emulation.wiring.stop_level': 0}, r'stop_level must be 0'),
+        ({'emulation.wiring.stop_line': 4}, r'stop_input \(0\) is another line'),
+        ({'boards.stop_level': 0}, 'broken wire'),
+        ({'emulation.wiring.enable_level': 1}, 'wrong way round'),
+        ({'emulation.wiring.enable_line': 4}, r'enable_output \(1\) is another line'),
+    ],
+)
+def test_a_last_line_that_is_wired_otherwise(claimed: dict[str, object], text: str) -> None:
+    with pytest.raises(WrongError, match=text):
+        prove(claimed, nothing)
+
+
+def never_enabled(boards: EmulatedBoards) -> None:
+    boards.lines._enable_level = 2
+
+
+def always_enabled(boards: EmulatedBoards) -> None:
+    boards.lines._enable = -1
+
+
+def stays_enabled(boards: EmulatedBoards) -> None:
+    boards.lines.let_go = lambda _expired: None  # type: ignore[method-assign]
+
+
+@pytest.mark.parametrize(
+    ('spoil', 'text'),
+    [
+        (never_enabled, 'no current flows even when enabled'),
+        (always_enabled, 'whether enabled or not'),
+        (stays_enabled, 'enabled after the watchdog expired'),
+    ],
+)
+def test_a_last_line_that_does_not_work(spoil: Callable[[EmulatedBoards], None], text: str) -> None:
+    with pytest.raises(WrongError, match=text):
+        prove({}, spoil)
+
+
+def test_a_watchdog_that_does_not_expire(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(EmulatedCard, 'on_tick', _without_watchdog)
+    with pytest.raises(WrongError, match='did not expire'):
+        prove({}, nothing)
+
+
+def _without_watchdog(card: EmulatedCard) -> None:
+    if card._task is not None and card._task.running:
+        card._task.take(card._world.counters[card._number])
+
+
+def test_the_proof_is_recorded_and_holds_for_what_was_proven(tmp_path: Path) -> None:
+    given = {**LINES, 'boards.memory': str(tmp_path / 'boards.json')}
+    parameters = build(BridgeParameters, given)
+    memory = Memory(parameters)
+    assert not memory.proven(parameters)
+    memory.record_proof(parameters)
+    assert memory.proven(parameters)
+    assert not memory.proven(build(BridgeParameters, {**given, 'boards.enable_output': 2}))

@@ -401,3 +401,21 @@ def test_stopped_it_lands_first_and_takes_no_more_samples() -> None:
     sampling.start()
     node.tick()
     assert node.measured[-1] == 6
+
+
+@pytest.mark.parametrize('mode', ['lockstep', 'realtime'])
+def test_while_the_stage_is_lost_nothing_ticks(mode: str) -> None:
+    stage = MadeUpStage(real=True)
+    node = MadeUpNode(mode=mode)
+    sampling = Sampling(node, stage)  # type: ignore[arg-type,var-annotated]
+    sampling.start()
+    timer = node.timers[0]
+    stage.failing = True
+    if mode == 'realtime':
+        node.tick()
+    else:
+        sampling.land('for a test')
+        sampling._advance()
+    assert not timer.ticking
+    assert sampling.reset()[0]
+    assert timer.ticking

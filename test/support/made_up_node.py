@@ -32,6 +32,19 @@ class Topic:
         self.newest = message
 
 
+class Timer:
+    """Ticks, or was cancelled."""
+
+    def __init__(self, period: float) -> None:
+        self.period, self.timer_period_ns, self.ticking = period, 0, True
+
+    def cancel(self) -> None:
+        self.ticking = False
+
+    def reset(self) -> None:
+        self.ticking = True
+
+
 class Inbox:
     """The queue of currents in real time."""
 
@@ -78,7 +91,7 @@ class MadeUpNode:
 
     def create_timer(self, period: float, action: Any, clock: Any) -> Any:
         self.tick = action
-        timer = SimpleNamespace(period=period, timer_period_ns=0, reset=lambda: None)
+        timer = Timer(period)
         self.timers.append(timer)
         return timer
 

@@ -1,23 +1,32 @@
 """Bring a machine up step by step at low current, saying what is seen and what to change.
 
-No graph is needed, and nothing else may use the boards meanwhile. Before every step it asks;
-outputs are at 0 V while it waits. The first thing that is wrong ends it, with exit code 1.
+No graph is needed, and nothing else may use the boards meanwhile. Before every step it asks; no
+current flows while it waits. With dummy loads it first proves what ends the current when all else
+fails; only then the motors are connected. The first thing that is wrong ends it, with exit code 1.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
+import signal
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
+from maglev_hw_bridge.board import undisturbed
 from maglev_hw_bridge.diagnosis import diagnose
+from maglev_hw_bridge.doubts import doubts
 from maglev_hw_bridge.drivers import Driver, DriverError, make_driver
+from maglev_hw_bridge.drivers.emulated import EmulatedDriver
 from maglev_hw_bridge.encoders import Encoders, HomingError
 from maglev_hw_bridge.lift import Lift
+from maglev_hw_bridge.memory import Memory
+from maglev_hw_bridge.operators import EmulatedPerson, Operator, Person, StoppedError
 from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.proof import Proof, WrongError
 from maglev_hw_bridge.response import Pulses, Twins
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES, PHASE_NAMES, PHASES
 from maglev_hw_bridge.stage import BridgeStage
@@ -28,16 +37,8 @@ from maglev_model.stage import StageError
 _HOP = 5e-4  # first lift-off [m]
 
 
-class WrongError(Exception):
-    """A step found something wrong; the message says what to change."""
-
-
-class StoppedError(Exception):
-    """The operator does not want to go on."""
-
-
 class Commissioning:
-    """The steps, on one machine; ``ask`` is called before each with what it does."""
+    """The steps, on one machine; the operator agrees to each and acts where it is needed."""
 
     def __init__(
         self,
@@ -45,37 +46,55 @@ class Commissioning:
         driver: Driver,
         *,
         peak: float,
-        ask: Callable[[str], None],
+        operator: Operator,
         tell: Callable[[str], None] = print,
     ) -> None:
         self._parameters, self._driver = parameters, driver
-        self._peak, self._ask, self._tell = peak, ask, tell
+        self._peak, self._operator, self._tell = peak, operator, tell
+        self._ask = operator.go_on
+        self._memory = Memory(parameters)
         self._realtime = parameters.driver != 'emulated'
         self._encoders = Encoders(parameters)
         self._counts = np.zeros(6, dtype=np.int32)
 
     def run(self) -> None:
         """All steps. Raises WrongError, StoppedError, DriverError, StageError."""
-        self._boards()
+        self._memory.claim()
         try:
+            self._remember()
+            self._boards()
+            self._last_line()
             self._homing()
             self._phases()
         finally:
             self._driver.close()
+            self._memory.release()
         self._first_lift_off()
 
+    def _remember(self) -> None:
+        """What came before: a fault is for the operator to look into now."""
+        load, fault = self._memory.recall()
+        if fault is not None:
+            self._ask(f'a fault is latched since before: {fault.reason}; {fault.remedy}, then on')
+        self._memory.keep(load, None, active=False)
+
     def _boards(self) -> None:
-        self._ask('open and check the boards; outputs stay at 0 V')
+        self._ask('open and check the boards; no current')
         self._driver.open()
         self._driver.counts(self._counts)
         self._encoders.start(self._counts)
         for name, count in zip(ENCODER_NAMES, self._counts, strict=True):
             self._tell(f'  encoder {name}: {count} counts')
-        if self._driver.stop_pressed:
-            raise WrongError(
-                'the emergency stop input is active: release it, or check boards.stop_input and '
-                'boards.stop_level'
-            )
+        for doubt in doubts(self._parameters):
+            self._tell(f'  {doubt}')
+
+    def _last_line(self) -> None:
+        self._ask(
+            'prove the last line with dummy loads, up to 0.5 A in motor 1 phase a: stop input, '
+            'enable line, watchdog, emergency stop'
+        )
+        Proof(self._parameters, self._driver, self._operator, self._tell).run()
+        self._memory.record_proof(self._parameters)
 
     def _homing(self) -> None:
         home = self._parameters.homing
@@ -129,14 +148,15 @@ class Commissioning:
         )
         lift = Lift(self._parameters, _HOP)
         stage = BridgeStage(self._parameters, realtime=self._realtime, driver=self._driver)
-        try:
-            stage.configure()
-            stage.encoders.arrays.zero[:] = self._encoders.arrays.zero
-            stage.encoders.homed = True
-            stage.activate()
-            lift.fly(stage)
-        finally:
-            stage.close()
+        with undisturbed():  # in the air no signal ends it
+            try:
+                stage.configure()
+                stage.encoders.arrays.zero[:] = self._encoders.arrays.zero
+                stage.encoders.homed = True
+                stage.activate()
+                lift.fly(stage)
+            finally:
+                stage.close()
         if stage.fault is not None:
             raise WrongError(f'{stage.fault}; check machine.* and the currents')
         seen = f'rose {lift.risen * 1e3:.2f} mm, tilted {lift.tilt * 1e3:.2f} mrad at most'
@@ -160,15 +180,27 @@ def _in_words(response: FloatArray) -> str:
     return '; '.join(texts)
 
 
-def _ask_operator(step: str) -> None:
-    print(f'\n{step}', flush=True)
-    answer = input('  go on? [y/N] ').strip().lower()
-    if answer not in ('y', 'yes'):
-        raise StoppedError
+def _operator(driver: Driver, yes: bool) -> Operator:
+    person = Person(yes)
+    if isinstance(driver, EmulatedDriver):
+        return EmulatedPerson(driver.boards, person.go_on)
+    return person
 
 
-def _announce(step: str) -> None:
-    print(f'\n{step}', flush=True)
+@contextlib.contextmanager
+def _ended_by_signals() -> Iterator[None]:
+    """SIGTERM and SIGHUP end it in order, as SIGINT does."""
+
+    def end(_number: int, _frame: object) -> None:
+        raise KeyboardInterrupt
+
+    numbers = (signal.SIGTERM, signal.SIGHUP)
+    before = [signal.signal(number, end) for number in numbers]
+    try:
+        yield
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)
 
 
 def _load(files: Sequence[str]) -> BridgeParameters:
@@ -201,8 +233,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
     try:
         parameters = _load(options.params)
         driver = make_driver(parameters, realtime=parameters.driver != 'emulated')
-        ask = _announce if options.yes else _ask_operator
-        Commissioning(parameters, driver, peak=options.current, ask=ask).run()
+        operator = _operator(driver, options.yes)
+        with _ended_by_signals():
+            Commissioning(parameters, driver, peak=options.current, operator=operator).run()
     except WrongError as error:
         print(f'\ncommission: wrong: {error}', file=sys.stderr)
         return 1
@@ -210,7 +243,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
         print(f'commission: error: {error}', file=sys.stderr)
         return 1
     except (StoppedError, EOFError, KeyboardInterrupt):
-        print('\ncommission: stopped; outputs are at 0 V', file=sys.stderr)
+        print('\ncommission: stopped; no current flows', file=sys.stderr)
         return 130
     print('\ncommission: all is well')
     return 0

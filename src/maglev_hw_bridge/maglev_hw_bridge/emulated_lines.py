@@ -29,6 +29,7 @@ class Lines:
         self._enable = really(wiring.enable_line, boards.enable_output)
         self._enable_level = really(wiring.enable_level, boards.enable_level)
         self.stop_pressed = False
+        self.stop_plugged = True
         self._written = np.zeros(LINES, dtype=np.int8)
         self._output = np.zeros(LINES, dtype=bool)
         self._let_go = False  # by an expired watchdog
@@ -49,7 +50,7 @@ class Lines:
     def levels(self) -> NDArray[np.int8]:
         """Of all lines, (32,)."""
         levels = np.full(LINES, _PULLED_UP, dtype=np.int8)
-        if self._stop >= 0:
+        if self._stop >= 0 and self.stop_plugged:
             levels[self._stop] = self._stop_level if self.stop_pressed else 1 - self._stop_level
         if not self._let_go:
             levels[self._output] = self._written[self._output]
@@ -58,4 +59,8 @@ class Lines:
     @property
     def enabled(self) -> bool:
         """Whether the amplifiers carry current: always where no line enables them."""
-        return self._enable < 0 or bool(self.levels[self._enable] == self._enable_level)
+        line = self._enable
+        if line < 0:
+            return True
+        driven = self._output[line] and not self._let_go
+        return bool((self._written[line] if driven else _PULLED_UP) == self._enable_level)

@@ -135,8 +135,36 @@ class Memory:
                 new.unlink()
             raise self._unusable(error) from error
 
+    def record_proof(self, parameters: BridgeParameters) -> None:
+        """Keep that the last line was proven with these parameters. Raises StageError."""
+        if self._path is not None:
+            try:
+                self._proof_file.write_text(json.dumps(_last_line(parameters)), encoding='utf-8')
+            except OSError as error:
+                raise self._unusable(error) from error
+
+    def proven(self, parameters: BridgeParameters) -> bool:
+        """Whether the last line was proven with what the parameters say of it."""
+        try:
+            content = json.loads(self._proof_file.read_text(encoding='utf-8'))
+        except (OSError, ValueError):
+            return False
+        return bool(content == _last_line(parameters))
+
+    @property
+    def _proof_file(self) -> Path:
+        assert self._path is not None
+        return self._path.with_name(self._path.stem + '-proven.json')
+
     def _unusable(self, error: OSError) -> StageError:
         return StageError(
             f"what must outlast this process cannot be kept in '{self._path}': {error.strerror}; "
             "let it be written there, or name another file by parameter 'boards.memory'"
         )
+
+
+def _last_line(parameters: BridgeParameters) -> dict[str, Any]:
+    """What the proof of the last line holds for."""
+    names = ['type', 'watchdog', 'stop_input', 'stop_level', 'enable_output', 'enable_level']
+    names += ['open_level', 'digital_expiry', 'analog_expiry']
+    return {name: getattr(parameters.boards, name) for name in names}

@@ -67,6 +67,11 @@ class BridgeNode(StageNode[BridgeNodeParameters, BridgeStage]):
         super().configure()
         for doubt in doubts(self.parameters):
             self.get_logger().warning(doubt)
+        if self.parameters.driver != 'emulated' and not self.stage.memory.proven(self.parameters):
+            self.get_logger().warning(
+                'watchdog, enable line and emergency stop are not proven as the parameters have '
+                'them: commission first'
+            )
         self._say_fault('latched since before')
 
     def deactivate(self) -> None:

@@ -83,6 +83,7 @@ class EmulatedBoards:
         self.jumps = np.zeros(6, dtype=np.int64)
         self.stuck = np.zeros(6, dtype=bool)
         self.failing = False
+        self.dummy_loads = False  # in place of the motors: nothing moves
         self.lines = Lines(parameters)
         self.expired = np.zeros(2, dtype=bool)
         self._held = self.rig.counts()
@@ -122,7 +123,10 @@ class EmulatedBoards:
         """One sample passes."""
         self._inject_faults()
         enabled = self.lines.enabled
+        rest = self.rig.state[::2] if self.dummy_loads else None
         self.rig.advance(self.volts[self._outputs] if enabled else self._no_current)
+        if rest is not None:
+            self.rig.place(rest)
         self.ticks += 1
         row = self.past[self.ticks % len(self.past)]
         row[:10], row[10:] = self.rig.state, self.rig.stage.command

@@ -1,0 +1,167 @@
+"""The last line proven, before anything levitates: stop input, enable line, watchdog.
+
+With dummy loads in place of the motors, each of them does what it is there for while the operator
+looks at the load; the first that does not names the parameter that is wrong.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from maglev_hw_bridge.amplifiers import Amplifiers
+from maglev_hw_bridge.drivers import Driver, WatchdogError
+from maglev_hw_bridge.operators import Act, Operator, Sight
+from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.signal_parameters import PHASES
+
+_CURRENT = 0.5  # through the load [A]
+_PRESS = 15.0  # time to press the stop [s]
+
+
+class WrongError(Exception):
+    """A step found something wrong; the message says what to change."""
+
+
+class Proof:
+    """The steps, on boards that are open; they are left open, with no current."""
+
+    def __init__(
+        self,
+        parameters: BridgeParameters,
+        driver: Driver,
+        operator: Operator,
+        tell: Callable[[str], None],
+    ) -> None:
+        self._boards = parameters.boards
+        self._driver, self._operator, self._tell = driver, operator, tell
+        self._amplifiers = Amplifiers(parameters)
+        self._period = parameters.sample_time
+        self._counts = np.zeros(6, dtype=np.int32)
+        self._current = np.zeros(PHASES)
+        self._current[0] = _CURRENT
+
+    def run(self) -> None:
+        """All steps that the parameters name lines for. Raises WrongError, DriverError."""
+        self._operator.act(Act.LOADS)
+        if self._boards.stop_input >= 0:
+            self._stop_input()
+        else:
+            self._tell('  boards.stop_input is -1: there is no emergency stop to prove')
+        self._enable_line()
+        self._watchdog()
+        if self._boards.stop_input >= 0:
+            self._emergency_stop()
+        self._operator.act(Act.MOTORS)
+
+    # -- stop input --------------------------------------------------------------------------------
+
+    def _stop_input(self) -> None:
+        level = self._boards.stop_level
+        wire = f'or boards.stop_input ({self._boards.stop_input}) is another line'
+        turned = f'boards.stop_level must be {1 - level}, {wire}'
+        self._operator.act(Act.RELEASE)
+        self._expect(False, f'released, the emergency stop reads as pressed: {turned}')
+        self._operator.act(Act.PRESS)
+        self._expect(True, f'pressed, the emergency stop reads as released: {turned}')
+        self._operator.act(Act.RELEASE)
+        self._expect(False, f'it reads as pressed when it is released again: {wire}')
+        self._operator.act(Act.UNPLUG)
+        self._expect(
+            True,
+            'a broken wire reads as released: use a contact that opens when it is pressed, and '
+            'for boards.stop_level what an open line reads (boards.open_level)',
+        )
+        self._operator.act(Act.PLUG)
+        self._expect(False, 'with its plug back, the emergency stop reads as pressed')
+        self._tell('  stop input: pressed, released, broken wire: pass')
+
+    def _expect(self, pressed: bool, wrong: str) -> None:
+        self._driver.counts(self._counts)
+        if self._driver.stop_pressed != pressed:
+            raise WrongError(wrong)
+
+    # -- enable line and watchdog ------------------------------------------------------------------
+
+    @contextlib.contextmanager
+    def _started(self) -> Iterator[None]:
+        self._driver.start()
+        try:
+            yield
+        finally:
+            self._driver.stop()
+
+    def _drive(self, seconds: float) -> None:
+        """Ask the outputs for the current for so long, or until the stop is pressed."""
+        for _ in range(round(seconds / self._period)):
+            self._driver.read(self._counts)
+            if self._driver.stop_pressed:
+                return
+            self._driver.write(self._amplifiers.drive_phases(self._current))
+
+    def _enable_line(self) -> None:
+        boards = self._boards
+        with self._started():
+            self._drive(self._operator.look)
+            enabled = self._operator.sees(Sight.CURRENT)
+        with self._started():
+            self._driver.disable()
+            self._drive(self._operator.look)
+            disabled = self._operator.sees(Sight.CURRENT)
+        if boards.enable_output < 0:
+            if not enabled:
+                raise WrongError('no current flows: check amplifier.board and channel, the supply')
+            self._tell('  boards.enable_output is -1: there is no enable line to prove')
+            return
+        line = f'boards.enable_output ({boards.enable_output})'
+        if disabled and not enabled:
+            raise WrongError(f'the enable line acts the wrong way round: see to {line} and '
+                             f'boards.enable_level ({boards.enable_level}); what the amplifiers '
+                             'need otherwise takes an inverter')  # fmt: skip
+        if disabled:
+            raise WrongError(f'current flows whether enabled or not: {line} is another line')
+        if not enabled:
+            raise WrongError(f'no current flows even when enabled: {line} is another line, or the '
+                             'supply is off')  # fmt: skip
+        self._tell('  enable line: current when enabled, none when disabled: pass')
+
+    def _watchdog(self) -> None:
+        boards = self._boards
+        try:
+            with self._started():
+                self._drive(self._operator.look)
+                self._operator.wait(2.0 * boards.watchdog)
+                flows = self._operator.sees(Sight.CURRENT)
+                enabled = boards.enable_output >= 0 and self._operator.sees(Sight.ENABLED)
+                self._driver.write(self._amplifiers.cut())
+        except WatchdogError:
+            pass
+        else:
+            raise WrongError(
+                f'the watchdog did not expire within {2.0 * boards.watchdog:g} s: see to '
+                'boards.watchdog'
+            )
+        if flows:
+            raise WrongError('current flows on after the watchdog expired: see to the boards')
+        if enabled:
+            raise WrongError(
+                'the amplifiers are enabled after the watchdog expired: boards.enable_level, '
+                'open_level or digital_expiry do not say what the boards do'
+            )
+        self._tell('  watchdog: expires in time, no current: pass')
+
+    def _emergency_stop(self) -> None:
+        with self._started():
+            self._operator.act_soon(Act.PRESS)
+            self._drive(_PRESS)
+            if not self._driver.stop_pressed:
+                raise WrongError('the emergency stop was not seen while current flowed')
+            self._driver.disable()
+            self._drive(self._operator.look)
+            flows = self._operator.sees(Sight.CURRENT)
+        if flows:
+            raise WrongError('current flows on after an emergency stop')
+        self._operator.act(Act.RELEASE)
+        self._tell('  emergency stop: no current: pass')

@@ -1,0 +1,137 @@
+"""From signals to the end of a process: in order, and no second signal cuts a landing short."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Callable, Iterator
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from maglev_node import process
+from maglev_node.stage_node import StageNode
+
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+class Node:
+    """A node whose poll of signals comes after what ``meanwhile`` does, at most a few times."""
+
+    publishers = ()
+    exit_code = None
+
+    def __init__(self, meanwhile: Callable[[], None], agrees: Callable[[], bool]) -> None:
+        self._meanwhile, self._agrees = meanwhile, agrees
+        self.happened: list[str] = []
+
+    def spin(self, stop: Callable[[], bool]) -> None:
+        for _ in range(5):
+            self._meanwhile()
+            time.sleep(0.001)
+            if stop():
+                return
+        self.happened.append('never stopped')
+
+    def may_stop(self) -> bool:
+        self.happened.append('asked')
+        return self._agrees()
+
+    def close(self) -> None:
+        self.happened.append('closed')
+
+    def destroy_node(self) -> None:
+        self.happened.append('destroyed')
+
+
+@pytest.fixture(autouse=True)
+def handlers(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """No middleware, and the handlers of before afterwards."""
+    monkeypatch.setattr(process, 'prepare_middleware', lambda: None)
+    monkeypatch.setattr(process.rclpy, 'init', lambda **_: None)
+    monkeypatch.setattr(process.rclpy, 'try_shutdown', lambda: None)
+    before = [signal.getsignal(number) for number in ENDING]
+    yield
+    for number, handler in zip(ENDING, before, strict=True):
+        signal.signal(number, handler)
+
+
+def send(*numbers: signal.Signals) -> Callable[[], None]:
+    """What sends the signals the first time it is called."""
+    left = list(numbers)
+
+    def meanwhile() -> None:
+        while left:
+            os.kill(os.getpid(), left.pop(0))
+
+    return meanwhile
+
+
+def run(node: Any) -> int:
+    return process.run(lambda: node, 'node')
+
+
+@pytest.mark.parametrize('number', ENDING)
+def test_a_signal_ends_it_in_order(number: signal.Signals) -> None:
+    node = Node(send(number), lambda: True)
+    assert run(node) == 0
+    assert node.happened == ['asked', 'closed', 'destroyed']
+
+
+@pytest.mark.parametrize('second', ENDING)
+@pytest.mark.parametrize('first', ENDING)
+def test_two_signals_at_once_do_not_skip_the_landing(
+    first: signal.Signals, second: signal.Signals
+) -> None:
+    node = Node(send(first, second), lambda: True)
+    assert run(node) == 0
+    assert node.happened == ['asked', 'closed', 'destroyed']
+
+
+def test_a_second_signal_while_it_lands_does_not_cut_it_short() -> None:
+    landed = []
+
+    def lands() -> bool:
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(0.002)
+        landed.append(True)
+        return True
+
+    node = Node(send(signal.SIGINT), lands)
+    assert run(node) == 0
+    assert landed == [True]
+
+
+def test_a_node_that_waits_is_ended_by_a_second_signal_and_by_no_first() -> None:
+    node = Node(send(signal.SIGINT), lambda: False)
+    run(node)
+    assert node.happened == ['asked'] * 5 + ['never stopped', 'closed', 'destroyed']
+    node = Node(send(signal.SIGINT, signal.SIGINT), lambda: False)
+    assert run(node) == 0
+    assert node.happened == ['asked', 'closed', 'destroyed']
+
+
+def test_a_hang_up_that_is_ignored_stays_ignored() -> None:
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
+    node = Node(send(signal.SIGHUP), lambda: True)
+    run(node)
+    assert 'asked' not in node.happened
+
+
+@pytest.mark.parametrize('works', [True, False])
+def test_a_defect_lands_or_releases(works: bool) -> None:
+    done = []
+
+    def land(why: str) -> None:
+        done.append('lands')
+        if not works:
+            raise RuntimeError(why)
+
+    node: Any = SimpleNamespace(
+        _sampling=SimpleNamespace(land=land, release=lambda: done.append('released')),
+        get_logger=lambda: SimpleNamespace(fatal=lambda _text: None),
+    )
+    StageNode.rescue(node)
+    assert done == (['lands'] if works else ['lands', 'released'])
