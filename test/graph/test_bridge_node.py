@@ -76,7 +76,11 @@ def answer(observer: Observer) -> Callable[..., None]:
     publisher = observer.node.create_publisher(Currents, CURRENTS, sample_qos())
 
     def publish(sequence: int, current: float = 0.0) -> None:
-        publisher.publish(Currents(sequence=sequence, direct_current=[current] * 4))
+        measured = [m for m in observer.messages[MEASUREMENT] if m.sequence == sequence]
+        message = Currents(header=measured[0].header, sequence=sequence, session=1)
+        message.direct_current = [current] * 4
+        message.status = Currents.FLYING if current else Currents.RESTING
+        publisher.publish(message)
 
     return publish
 

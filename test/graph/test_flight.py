@@ -19,7 +19,7 @@ from flight import (
 from graph import Nodes, Observer
 
 from maglev_msgs.msg import ControllerState, Reference
-from maglev_node.topics import CONTROLLER_STATE, CURRENTS, MEASUREMENT, REFERENCE, TRUE_STATE
+from maglev_node.topics import CONTROLLER_STATE, MEASUREMENT, REFERENCE, TRUE_STATE
 
 
 def errors_on_time(observer: Observer, first: int) -> np.ndarray:
@@ -115,7 +115,8 @@ def test_emergency_stop_of_the_controller(nodes: Nodes, watching: Observer) -> N
     watching.wait(lambda: airborne(watching))
     assert watching.call('/controller/emergency_stop').success
     watching.wait(lambda: watching.newest(CONTROLLER_STATE).mode == ControllerState.FAULT)
-    assert not np.any(watching.newest(CURRENTS).direct_current)
+    watching.wait(lambda: landed_without_current(watching))
+    assert impact_speed(watching) < 0.05
     assert not watching.call('/controller/enable', True).success
     assert watching.call('/controller/reset').success
     assert watching.call('/controller/enable', True).success

@@ -56,8 +56,10 @@ def test_after_an_emergency_stop_only_a_lift_off_flies(nodes: Nodes, watching: O
     graph = fly(nodes, LONG, 'lift_off.time:=6.0')
     watching.wait(lambda: gap(watching) < LOWER_STOP - 2e-4)
     assert watching.call('/controller/emergency_stop').success
-    graph['reference'].wait_for('the controller has cut the currents')
+    graph['reference'].wait_for('the controller lands by itself')
     watching.wait(lambda: phase(watching) == Reference.END)
+    watching.wait(lambda: mode(watching) == ControllerState.FAULT)
+    samples(watching, 10)
     refused = watching.call('/reference/lift_off')
     assert not refused.success
     services = '/controller/reset, then /controller/enable, then /reference/lift_off'
@@ -79,9 +81,10 @@ def test_after_an_emergency_stop_only_a_lift_off_flies(nodes: Nodes, watching: O
 def test_off_the_lower_stop_a_lift_off_is_refused(nodes: Nodes, watching: Observer) -> None:
     fly(nodes, LONG)
     watching.wait(lambda: airborne(watching))
-    assert watching.call('/controller/emergency_stop').success
+    assert watching.call('/plant/emergency_stop').success
     watching.wait(lambda: gap(watching) < 0.0181)  # the magnets pull it up
-    assert watching.call('/controller/reset').success
+    watching.wait(lambda: mode(watching) == ControllerState.DISABLED)  # having lost its platen
+    assert watching.call('/plant/reset').success
     assert watching.call('/controller/enable', True).success
     samples(watching, 300)
     answer = watching.call('/reference/lift_off')

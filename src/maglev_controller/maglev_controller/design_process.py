@@ -1,13 +1,12 @@
 """The process in which a regulator is designed while another one flies.
 
 Designing takes a tenth of a second and more, most of it in calls that keep the interpreter to
-themselves: in a thread it would stop the loop. ``python -m maglev_controller.design_process`` is
-the other process: it reads the regulator in use and the new parameters, and writes what came of it.
+themselves: in a thread it would stop the loop. The other process reads the regulator in use and the
+new parameters, and writes what came of it.
 """
 
 from __future__ import annotations
 
-import os
 import pickle
 import subprocess
 import sys
@@ -21,6 +20,14 @@ from maglev_model.parameters import ParameterError
 
 _LONGEST = 20.0  # [s]
 
+# Gives back the real-time priority it has from the loop it shall not disturb, before it imports.
+_PROGRAM = """
+import os
+os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+from maglev_controller.design_process import main
+main()
+"""
+
 
 class DesignProcess:
     """A design under way; :meth:`result` once it is :attr:`done`."""
@@ -33,7 +40,7 @@ class DesignProcess:
         self._input.seek(0)
         self._begun = time.monotonic()
         self._process = subprocess.Popen(
-            [sys.executable, '-m', 'maglev_controller.design_process'],
+            [sys.executable, '-c', _PROGRAM],
             stdin=self._input,
             stdout=self._output,
         )
@@ -61,11 +68,7 @@ class DesignProcess:
 
 
 def main() -> None:
-    """Design what is asked for on stdin, and write it to stdout.
-
-    Gives back the real-time priority it has from the loop it shall not disturb.
-    """
-    os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+    """Design what is asked for on stdin, and write it to stdout."""
     previous, parameters = pickle.load(sys.stdin.buffer)
     try:
         regulator = Regulator(parameters)
@@ -73,7 +76,3 @@ def main() -> None:
         sys.stdout.buffer.write(pickle.dumps(outcome))
     except ParameterError as error:
         sys.stdout.buffer.write(pickle.dumps(error))
-
-
-if __name__ == '__main__':
-    main()

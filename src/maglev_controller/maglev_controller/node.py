@@ -262,14 +262,21 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
             self._answer(self._pending)
 
     def on_parameters(self, parameters: ControllerNodeParameters) -> None:
-        """Redesign in another process, serving the loop, and change over between two samples."""
+        """Redesign in another process, serving the loop, and change over between two samples.
+
+        The loop is served between all that takes a millisecond.
+        """
+        self._serve_by_hand()
         law = self._law(parameters)
+        self._serve_by_hand()
         if law != self.supervisor.parameters:
             design = self.supervisor.redesign(law)
             while not design.done:
                 self._serve_by_hand()
                 time.sleep(_HAND_PERIOD)
-            self.supervisor.adopt(*design.result())
+            regulator = design.result()
+            self._serve_by_hand()
+            self.supervisor.adopt(*regulator)
         self._longest_gap = parameters.measurement_timeout / parameters.sample_time
 
     @staticmethod

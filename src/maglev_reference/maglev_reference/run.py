@@ -20,7 +20,7 @@ _GROUND = (Phase.REST, Phase.END)
 
 _OBSTACLES = {
     Mode.DISABLED: ('the controller is disabled', ('enable',)),
-    Mode.FAULT: ('the controller has cut the currents', ('reset', 'enable')),
+    Mode.FAULT: ('the controller is in a fault', ('reset', 'enable')),
     Mode.LANDING: ('the controller lands by itself', ('enable',)),
 }
 
