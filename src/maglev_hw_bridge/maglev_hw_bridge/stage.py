@@ -91,9 +91,10 @@ class BridgeStage:
     def _warm_up(self) -> None:
         """Compile, or load what was compiled, before a sample asks for it."""
         y, rate = self._lower_stop, np.zeros(5)
-        self.guard.watch(np.array([y, y, y, y, 0.0, 0.0]), True)
+        for _ in range(3):
+            self.guard.watch(np.array([y, y, y, y, 0.0, 0.0]), self.amplifiers.arrays.current, True)
         self.landing.begin(self.guard.arrays.position, rate)
-        self.landing.step(self.guard.arrays.position, rate)
+        self.landing.step(self.guard.arrays.position, rate, rate)
         self.encoders.decode(self._counts)
         self.amplifiers.drive(self._zero, self._zero, 0.0, 0.0)
         faults.consequence_of_cut(self.parameters, self.guard)
@@ -169,7 +170,7 @@ class BridgeStage:
             if self.realtime:
                 time.sleep(self.parameters.sample_time)
         shift = self.encoders.home(readings)
-        self.guard.forget()
+        self.guard.trust()
         return shift
 
     def _peek(self, counts: NDArray[np.int32]) -> None:
@@ -200,7 +201,7 @@ class BridgeStage:
         except DriverError as error:
             raise self._lose_boards(error) from error
         length = self.encoders.decode(self._counts)
-        code, index = self.guard.watch(length, self.flying)
+        code, index = self.guard.watch(length, self.amplifiers.arrays.current, self.flying)
         if code != guard.FINE:
             self._sensing_fault(code, index)
         if self.driver.stop_pressed:
@@ -243,7 +244,6 @@ class BridgeStage:
         code, index = self.amplifiers.drive(i_d, i_q, x, z)
         if code in (amplifiers.FINE, amplifiers.SPENT):
             self._direct[:], self._quadrature[:] = i_d, i_q
-            self.guard.arrays.i_q[:] = i_q
             self.flying = bool(np.any(i_d) or np.any(i_q))
         if code == amplifiers.FINE:
             return ''
@@ -264,13 +264,12 @@ class BridgeStage:
 
     def _descend(self) -> None:
         state = self.guard.arrays
-        if self.landing.step(state.position, state.rate):
+        if self.landing.step(state.position, state.rate, state.disturbance):
             self._disable()
             return
         x, z = state.believed[4], state.believed[5]
         i_d, i_q = self.landing.direct_current, self.landing.quadrature_current
         code, _ = self.amplifiers.drive(i_d, i_q, x, z)
-        state.i_q[:] = i_q
         if code not in (amplifiers.FINE, amplifiers.SPENT):
             self._disable()
 
@@ -351,7 +350,7 @@ class BridgeStage:
             self._disable()
             return
         self.mode = Mode.LANDING
-        self.landing.begin(state.position, state.rate)
+        self.landing.begin(state.position, state.rate, self.guard.blind)
 
     def _disable(self) -> None:
         self.mode = Mode.DISABLED
@@ -365,10 +364,11 @@ class BridgeStage:
                 return
             self._raise_fault('range', *faults.range_fault(code, index, self.guard))
         else:
-            unsound = not self.guard.mended
-            self._raise_fault(
-                'encoder', *faults.encoder_fault(code, index, self.guard), cut=unsound
-            )
+            reason, remedy = faults.encoder_fault(code, self.guard)
+            blind = self.guard.blind
+            self._raise_fault('encoder', reason, remedy, cut=bool(blind[0]))
+            if self.mode is Mode.LANDING and blind.any():
+                self._begin_landing()
 
     def _late(self) -> None:
         self.late_ticks += 1
