@@ -39,6 +39,8 @@ _RESIDUAL_SAMPLES = 2
 _PROBATION = 20  # samples after a slip in which noise would leap again
 _DOUBT = 0.25  # share of what makes an encoder stuck, from which on it is not followed
 _CERTAIN = 2.5  # as many times it is stuck whatever the others read
+_DOUBTFUL_RESIDUAL = 6e-5  # [m]
+_GROUND = 1e-3  # this near the lower stop nothing is at stake any more [m]
 _AGREED = 2e-5  # how near the others must read to what is foretold then [m]
 
 
@@ -62,6 +64,8 @@ class GuardArrays(ObserverArrays):
     residual: float  # g1 + g3 - g2 - g4 as it is read [m]
     believed: Annotated[FloatArray, 6]  # lengths, put right or by the observer
     past: Annotated[FloatArray, 2, 6]  # believed lengths of the last sample and the one before
+    rigid: bool  # whether four believed gaps must be those of a rigid platen
+    residual_then: Annotated[FloatArray, 4]  # when a gap encoder counted last [m]
     unseen: Annotated[FloatArray, 6]  # how far it should have moved at least since its last count
 
 
@@ -82,7 +86,9 @@ def _least_step(g: GuardArrays, i: int) -> float:
 
 @compiled
 def _at_rest(g: GuardArrays, i: int) -> bool:
-    """Whether friction may hold an encoder where it is."""
+    """Whether friction, or the lower stop, may hold an encoder where it is."""
+    if not g.rigid and g.position[Y] > g.upper[Y] - _GROUND:
+        return True
     if i >= 4:
         return bool(g.least_rate[i - 3] == 0.0)
     return bool(g.least_rate[Y] == 0.0 and g.least_rate[PHI if i % 2 == 0 else THETA] == 0.0)
@@ -111,65 +117,87 @@ def _slips(g: GuardArrays) -> bool:
 @compiled
 def _look(g: GuardArrays, flying: bool, counted: Flags) -> None:
     """Which encoders counted, and how far each of the others should have moved since it did."""
+    residual = _residual(g.believed)
     for i in range(6):
         counted[i] = g.trust[i] != LOST and g.believed[i] != g.past[0, i]
         if counted[i] or not flying or _at_rest(g, i):
             g.unseen[i] = 0.0
         else:
             g.unseen[i] += _least_step(g, i)
+        if i < 4 and (counted[i] or g.probation[i] > 0):
+            g.residual_then[i] = residual
+        g.probation[i] = max(g.probation[i] - 1, 0)
 
 
 @compiled
-def _doubtful(g: GuardArrays, used: Flags) -> None:
-    """Leave those encoders out of ``used`` (6,) that should have moved and did not."""
-    doubtful = believed = 0
+def _doubt(g: GuardArrays, flying: bool, doubted: Flags) -> None:
+    """Which encoders stand still, ``doubted`` (6,), where others or the model say they should not.
+
+    A residual that four believed gaps have built up since an encoder's last count may be its own.
+    """
+    g.rigid = flying
+    for i in range(4):
+        g.rigid = g.rigid and g.trust[i] != LOST
+    residual = _residual(g.believed)
+    for i in range(6):
+        doubted[i] = abs(g.unseen[i]) > _DOUBT * g.max_unseen[i] or (
+            i < 4 and g.rigid and abs(residual - g.residual_then[i]) > _DOUBTFUL_RESIDUAL
+        )
+        doubted[i] = doubted[i] and g.trust[i] != LOST and g.probation[i] == 0
+
+
+@compiled
+def _choose(g: GuardArrays, doubted: Flags, used: Flags) -> None:
+    """Which encoders to follow, ``used`` (6,)."""
+    doubtful = followed = 0
     agreed, certain = True, False
     for i in range(6):
-        used[i] = g.trust[i] != LOST
-        doubted = abs(g.unseen[i]) > _DOUBT * g.max_unseen[i]
+        used[i] = g.trust[i] != LOST and g.probation[i] == 0
         if i >= 4:
-            used[i] = used[i] and not doubted
-        elif used[i] and g.probation[i] == 0:
-            believed += 1
-            if doubted:
-                doubtful += 1
-                certain = certain or abs(g.unseen[i]) > _CERTAIN * g.max_unseen[i]
-            elif abs(g.believed[i] - g.length[i]) > _AGREED:
-                agreed = False
-    if agreed or certain or (doubtful == 1 and believed == 4):
+            used[i] = used[i] and not doubted[i]
+        elif doubted[i]:
+            doubtful += 1
+            certain = certain or abs(g.unseen[i]) > _CERTAIN * g.max_unseen[i]
+        elif used[i]:
+            followed += 1
+            agreed = agreed and abs(g.believed[i] - g.length[i]) <= _AGREED
+    if agreed or certain or followed >= 2:
         for i in range(4):
-            if abs(g.unseen[i]) > _DOUBT * g.max_unseen[i]:
-                used[i] = False
-    for i in range(6):
-        if g.probation[i] > 0:
-            used[i] = False
-            g.probation[i] -= 1
+            used[i] = used[i] and not doubted[i]
 
 
 @compiled
-def _stick(g: GuardArrays, used: Flags) -> bool:
+def _gone(g: GuardArrays, i: int) -> bool:
+    """Whether an encoder that is not followed any more is too far from what it reads."""
+    if abs(g.unseen[i]) > g.max_unseen[i]:
+        return True
+    return bool(i < 4 and g.rigid and abs(_residual(g.believed) - g.residual_then[i]) > g.max_unseen[i])
+
+
+@compiled
+def _stick(g: GuardArrays, doubted: Flags, used: Flags) -> bool:
     """Do without the encoders that are left out for too long; whether there are new ones."""
     found = False
     for i in range(6):
-        if g.trust[i] != LOST and not used[i] and abs(g.unseen[i]) > g.max_unseen[i]:
+        if doubted[i] and not used[i] and _gone(g, i):
             g.trust[i] = LOST
             found, g.blamed[i] = True, 1
         if i >= 4 and g.trust[i] == LOST:
             observer.bound_disturbance(g, i - 3)
+    if found:
+        observer.bound_disturbance(g, PHI)
+        observer.bound_disturbance(g, THETA)
     return found
 
 
 @compiled
-def _follow_model(g: GuardArrays, used: Flags) -> None:
+def _follow_model(g: GuardArrays, doubted: Flags, used: Flags) -> None:
     """What no encoder shows now, because it stands still, moves as the model alone says."""
     for axis in (X, Z):
-        if abs(g.unseen[3 + axis]) > _DOUBT * g.max_unseen[3 + axis] and g.trust[3 + axis] != LOST:
+        if doubted[3 + axis]:
             observer.alone(g, axis)
-    used_gaps = used[0] or used[1] or used[2] or used[3]
-    doubted = False
-    for i in range(4):
-        doubted = doubted or (g.trust[i] != LOST and g.probation[i] == 0)
-    if doubted and not used_gaps:
+    doubtful = doubted[0] or doubted[1] or doubted[2] or doubted[3]
+    if doubtful and not (used[0] or used[1] or used[2] or used[3]):
         for axis in (Y, PHI, THETA):
             observer.alone(g, axis)
 
@@ -201,6 +229,7 @@ def _begin(g: GuardArrays) -> None:
     if g.samples == 0:
         observer.start(g, g.believed)
         g.past[0] = g.believed
+        g.residual_then[:] = _residual(g.believed)
     else:
         before = g.position.copy()
         observer.start(g, g.believed)
@@ -211,14 +240,15 @@ def _begin(g: GuardArrays) -> None:
 @compiled
 def _judge(g: GuardArrays, current: FloatArray, flying: bool) -> int:
     """Predict, find what is wrong with the encoders, correct; returns a code."""
-    counted, used = np.empty(6, np.bool_), np.empty(6, np.bool_)
+    counted, doubted, used = np.empty(6, np.bool_), np.empty(6, np.bool_), np.empty(6, np.bool_)
     observer.predict(g, current)
     code = JUMP if _slips(g) else FINE
     _look(g, flying, counted)
-    _doubtful(g, used)
-    if _stick(g, used) and code == FINE:
+    _doubt(g, flying, doubted)
+    _choose(g, doubted, used)
+    if _stick(g, doubted, used) and code == FINE:
         code = STUCK
-    _follow_model(g, used)
+    _follow_model(g, doubted, used)
     observer.correct(g, g.believed, used, counted)
     for i in range(6):
         if g.trust[i] == LOST:

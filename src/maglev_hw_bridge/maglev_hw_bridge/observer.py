@@ -240,6 +240,6 @@ def alone(o: ObserverArrays, axis: int) -> None:
 
 @compiled
 def bound_disturbance(o: ObserverArrays, axis: int) -> None:
-    """Of an axis that nothing shows any more, friction is the only disturbance that can last."""
-    bound = o.friction[axis]
+    """Of an axis that nothing may show any more only friction is believed, of a tilt nothing."""
+    bound = o.friction[axis] if axis < PHI else 0.0
     o.disturbance[axis] = min(max(o.disturbance[axis], -bound), bound)

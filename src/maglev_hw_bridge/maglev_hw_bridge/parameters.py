@@ -65,13 +65,13 @@ class FaultParameters:
         within=(1e-6, 0.1),
     )
     stuck_horizontal: float = parameter(
-        3e-4,
+        1e-4,
         'x or z is stuck when it should have moved this far without a count',
         unit='m',
         within=(1e-6, 0.1),
     )
     friction: tuple[float, ...] = parameter(
-        (0.8, 0.4, 0.4, 3.0, 3.0),
+        (0.8, 0.35, 0.35, 3.0, 3.0),
         'by how much the force on a platen that stands still may differ from the model, friction '
         'and all' + _BY_AXIS,
         unit='m/s^2, rad/s^2',
