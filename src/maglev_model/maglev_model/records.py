@@ -16,7 +16,7 @@ Block = NDArray[np.void]
 
 
 class Record:
-    """The fields that a subclass annotates: ``float``, ``int``, ``bool``, or an array.
+    """The fields that a subclass and its bases annotate: ``float``, ``int``, ``bool``, or an array.
 
     ``Annotated[NDArray[np.float64], 2, 6]`` is an array of shape (2, 6). :attr:`block`, shape (1,),
     is what compiled functions take from Python; ``block[0]`` is there what they give each other,
@@ -26,7 +26,9 @@ class Record:
     dtype: ClassVar[np.dtype[np.void]]
 
     def __init_subclass__(cls) -> None:
-        fields = inspect.get_annotations(cls, eval_str=True)
+        fields: dict[str, Any] = {}
+        for base in reversed(cls.__mro__[: cls.__mro__.index(Record)]):
+            fields |= inspect.get_annotations(base, eval_str=True)
         cls.dtype = np.dtype([(name, *_element(hint)) for name, hint in fields.items()], align=True)
         for name in fields:
             setattr(cls, name, _array(name) if cls.dtype[name].shape else _number(name))
