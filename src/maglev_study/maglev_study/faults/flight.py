@@ -305,7 +305,7 @@ class Flight:
             self.each()
         ticks = self.world.ticks
         sample = self.bridge.sample(self.inbox)
-        if self.world.ticks == ticks:  # nobody waited for it
+        if sample is None and self.world.ticks == ticks:  # nobody waited; one that is late need not
             self.world.tick()
         self.samples += 1
         self.inbox = []
