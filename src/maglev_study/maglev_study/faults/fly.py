@@ -46,9 +46,9 @@ class Course:
         self.shows: list[int] = []
         self.hits: list[int] = []
         self.run = Run(flight, rng, self.hits)
-        self.judge.enable_counts = not any(
-            fault.call == 'write_digital' and 'wrong' in fault.kind for fault in scenario.faults
-        )
+        lying = {fault.call for fault in scenario.faults if 'wrong' in fault.kind}
+        self.judge.enable_counts = 'write_digital' not in lying
+        self.judge.output_counts = 'write_analog' not in lying
         if scenario.phase not in ('after a fault', 'reset'):
             flight.act()  # what is due at this very sample, and nothing later
             flight.acting = False
@@ -77,6 +77,7 @@ class Course:
         flight, judge = self.flight, self.judge
         if self._prepare():
             self._watch()
+        flight.acting = False
         judge.end()
         self._settle()
         self._insist()
