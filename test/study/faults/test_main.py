@@ -95,6 +95,4 @@ def test_ctrl_c_ends_in_order_with_what_was_done(tmp_path: Path) -> None:
     process.communicate(timeout=60.0)
     assert process.returncode == INTERRUPTED
     assert time.monotonic() - started < 30.0
-    assert 'incomplete' in (tmp_path / 'faults.html').read_text(encoding='utf-8') or (
-        tmp_path / 'failures.json'
-    ).read_text(encoding='utf-8').startswith('[\n {')
+    assert ' of 5000 runs' in (tmp_path / 'faults.html').read_text(encoding='utf-8')
