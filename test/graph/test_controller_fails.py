@@ -28,7 +28,7 @@ def fly(nodes: Nodes, observer: Observer, failing: str = '') -> dict[str, Proces
     else:
         graph['controller'] = nodes.start('controller', WATCHED)
     graph['reference'] = nodes.start('reference', LONG, WATCHED, params=(ELLIPSE,))
-    observer.wait(lambda: airborne(observer), timeout=120.0)
+    observer.wait(lambda: airborne(observer), timeout=180.0)
     return graph
 
 

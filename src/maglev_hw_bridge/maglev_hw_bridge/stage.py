@@ -18,19 +18,11 @@ from maglev_hw_bridge.landing import Landing
 from maglev_hw_bridge.life_cycle import StageLife
 from maglev_hw_bridge.mode import Mode as Mode
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_model.stage import (
-    STOP_REMEDY,
-    EncoderSample,
-    Fault,
-    StageError,
-    Truth,
-    motor_currents,
-)
+from maglev_model.stage import EncoderSample, Fault, StageError, Truth, motor_currents
 
 FloatArray = NDArray[np.float64]
 
-_ON_THE_STOP = 2e-4  # this near the lower stop the platen rests [m],
-_AT_REST = 0.02  # when it is slower than this [m/s]
+_ON_THE_STOP, _AT_REST = 2e-4, 0.02  # nearer the lower stop and slower it rests [m], [m/s]
 
 
 class BridgeStage(StageLife):
@@ -112,7 +104,7 @@ class BridgeStage(StageLife):
         return EncoderSample(length[:4].copy(), length.item(4), length.item(5))
 
     def write(self, direct_current: Any, quadrature_current: Any, age: int = 0) -> None:
-        """Currents of motors 1..4 [A], (4,) each, for the sample ``age`` before the last one read.
+        """Currents of motors 1..4 [A], (4,) each, for the sample ``age`` before the last one.
 
         Raises ValueError when a shape is wrong or a current is not finite or too large (the bridge
         then lands), StageError when the boards are lost.
@@ -158,9 +150,8 @@ class BridgeStage(StageLife):
 
     def _on_the_stop(self) -> bool:
         """Whether the platen rests on its lower stop."""
-        state = self.guard.arrays
-        resting = state.position[0] > self._lower_stop - _ON_THE_STOP
-        return bool(resting and abs(state.rate[0]) < _AT_REST)
+        y, rate = self.guard.arrays.position[0], self.guard.arrays.rate[0]
+        return bool(y > self._lower_stop - _ON_THE_STOP and abs(rate) < _AT_REST)
 
     def _put_out(self) -> None:
         if self.mode is Mode.LANDING:
@@ -195,11 +186,9 @@ class BridgeStage(StageLife):
             self.why = why
             self._begin_landing()
 
-    def stop(
-        self, why: str = 'emergency stop', *, kind: str = 'stop', remedy: str = STOP_REMEDY
-    ) -> None:
+    def stop(self, why: str = 'emergency stop', kind: str = 'stop', remedy: str = '') -> None:
         """Latch a fault with that reason; lands while everything needed for that is sound."""
-        self._raise_fault(kind, why, remedy)
+        self._raise_fault(kind, why, remedy or 'see to what made it necessary')
 
     def _raise_fault(self, kind: str, reason: str, remedy: str, cut: bool = False) -> None:
         if self.fault is not None and not (cut and self.mode is Mode.LANDING):

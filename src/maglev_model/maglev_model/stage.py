@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-STOP_REMEDY = 'see to what made it necessary'
-
 
 class EncoderSample(NamedTuple):
     """What the six encoders read at one sample."""
@@ -119,10 +117,8 @@ class Stage(Protocol):
         """Come down without a controller and follow no currents until :meth:`reset`."""
         ...
 
-    def stop(
-        self, why: str = 'emergency stop', *, kind: str = 'stop', remedy: str = STOP_REMEDY
-    ) -> None:
-        """Latch a fault with that reason, and land or cut the currents, as the stage can."""
+    def stop(self, why: str = 'emergency stop', kind: str = 'stop', remedy: str = '') -> None:
+        """Latch a fault, by default without a remedy of its own, and land or cut the currents."""
         ...
 
     def reset(self) -> tuple[bool, str]:

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 _SHARED_MEMORY = Path('/dev/shm')
 _LOCK = re.compile(r'sem\.(fastrtps_port(\d+))_mutex')
-_FIRST_PORT, _PORTS = 7400, 250  # of domain 0, and of each domain (DDSI-RTPS 9.6.1.1)
+FIRST_PORT, PORTS = 7400, 250  # of domain 0, and of each domain (DDSI-RTPS 9.6.1.1)
 _SIZE = 32  # of a semaphore [bytes]
 
 _MOMENT = 0.1  # a port is opened in far less [s]
@@ -69,11 +69,11 @@ def free_ports(domain: int, patience: float = _LONGEST) -> None:
 
 def held_locks(domain: int) -> set[Lock]:
     """The locks of a domain's ports that are at 0."""
-    first = _FIRST_PORT + _PORTS * domain
+    first = FIRST_PORT + PORTS * domain
     locks = set()
     for entry in os.scandir(_SHARED_MEMORY):
         match = _LOCK.fullmatch(entry.name)
-        if match and first <= int(match[2]) < first + _PORTS:
+        if match and first <= int(match[2]) < first + PORTS:
             with contextlib.suppress(OSError), open(entry.path, 'rb') as file:
                 found = os.fstat(file.fileno())
                 if _is_zero(file.read(4)):

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
 from maglev_model.records import Block
-from maglev_model.stage import STOP_REMEDY, EncoderSample, Fault, Truth, motor_currents
+from maglev_model.stage import EncoderSample, Fault, Truth, motor_currents
 from maglev_plant.arrays import StageArrays, stage_arrays
 from maglev_plant.dynamics import advance
 from maglev_plant.encoder import encode
@@ -171,11 +171,9 @@ class SimulatedStage:
         self._landed = True
         self.deactivate()
 
-    def stop(
-        self, why: str = 'emergency stop', *, kind: str = 'stop', remedy: str = STOP_REMEDY
-    ) -> None:
+    def stop(self, why: str = 'emergency stop', kind: str = 'stop', remedy: str = '') -> None:
         """Cut the currents and latch a fault with that reason."""
-        self._latch(kind, why, remedy)
+        self._latch(kind, why, remedy or 'see to what made it necessary')
 
     def reset(self) -> tuple[bool, str]:
         """Clear the latched fault and follow currents again; whether there was need to."""
