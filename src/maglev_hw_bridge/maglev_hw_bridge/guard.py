@@ -30,6 +30,10 @@ RESIDUAL: Final = 3
 GAP_RANGE: Final = 4
 RANGE: Final = 5
 
+# What speaks against encoders that stand still.
+UNSEEN: Final = 1
+CONTRADICTED: Final = 2
+
 # What an encoder is.
 SOUND: Final = 0
 PUT_RIGHT: Final = 1  # after a slip
@@ -37,8 +41,9 @@ LOST: Final = 2
 
 _RESIDUAL_SAMPLES = 2
 _PROBATION = 20  # samples after a slip in which noise would leap again
-_DOUBT = 0.25  # share of what makes an encoder stuck, from which on it is not followed
-_CERTAIN = 2.5  # as many times it is stuck whatever the others read
+_SETTLING = 100  # samples in which the disturbance is found
+_DOUBT = 2.5e-5  # an encoder that should have moved this far is not followed [m]
+_CERTAIN = 1.5  # as many times max_unseen it is stuck whatever the others read
 _DOUBTFUL_RESIDUAL = 6e-5  # [m]
 _GROUND = 1e-3  # this near the lower stop nothing is at stake any more [m]
 _AGREED = 2e-5  # how near the others must read to what is foretold then [m]
@@ -102,7 +107,8 @@ def _slips(g: GuardArrays) -> bool:
         step = g.believed[i] - g.past[0, i]
         error = step - g.step[i]
         again = step - (g.past[0, i] - g.past[1, i])
-        if g.trust[i] == LOST or min(abs(error), abs(again)) <= g.max_jump:
+        away = g.probation[i] == 1 and abs(g.believed[i] - g.length[i]) > g.max_jump
+        if g.trust[i] == LOST or (min(abs(error), abs(again)) <= g.max_jump and not away):
             continue
         found, g.blamed[i] = True, 1
         if g.trust[i] == PUT_RIGHT:
@@ -120,68 +126,63 @@ def _look(g: GuardArrays, flying: bool, counted: Flags) -> None:
     residual = _residual(g.believed)
     for i in range(6):
         counted[i] = g.trust[i] != LOST and g.believed[i] != g.past[0, i]
-        if counted[i] or not flying or _at_rest(g, i):
+        if counted[i] or not flying or g.samples < _SETTLING or _at_rest(g, i):
             g.unseen[i] = 0.0
         else:
             g.unseen[i] += _least_step(g, i)
-        if i < 4 and (counted[i] or g.probation[i] > 0):
+        if i < 4 and (counted[i] or not g.rigid):
             g.residual_then[i] = residual
         g.probation[i] = max(g.probation[i] - 1, 0)
 
 
 @compiled
-def _doubt(g: GuardArrays, flying: bool, doubted: Flags) -> None:
+def _residual_since(g: GuardArrays, i: int) -> float:
+    """What four believed gaps contradict each other by since an encoder's last count [m]."""
+    return abs(_residual(g.believed) - g.residual_then[i]) if i < 4 and g.rigid else 0.0
+
+
+@compiled
+def _doubt(g: GuardArrays, flying: bool, doubted: Flags) -> int:
     """Which encoders stand still, ``doubted`` (6,), where others or the model say they should not.
 
-    A residual that four believed gaps have built up since an encoder's last count may be its own.
+    The model is believed against gap encoders when it agrees with the others, or when three of them
+    tell without it; otherwise a residual says that some of those are wrong that do not count, where
+    it can be one or two. Returns what it was: UNSEEN, CONTRADICTED or 0.
     """
     g.rigid = flying
     for i in range(4):
-        g.rigid = g.rigid and g.trust[i] != LOST
-    residual = _residual(g.believed)
-    for i in range(6):
-        doubted[i] = abs(g.unseen[i]) > _DOUBT * g.max_unseen[i] or (
-            i < 4 and g.rigid and abs(residual - g.residual_then[i]) > _DOUBTFUL_RESIDUAL
-        )
-        doubted[i] = doubted[i] and g.trust[i] != LOST and g.probation[i] == 0
-
-
-@compiled
-def _choose(g: GuardArrays, doubted: Flags, used: Flags) -> None:
-    """Which encoders to follow, ``used`` (6,)."""
-    doubtful = followed = 0
+        g.rigid = g.rigid and g.trust[i] != LOST and g.probation[i] == 0
+    unseen = contradicted = 0
     agreed, certain = True, False
     for i in range(6):
-        used[i] = g.trust[i] != LOST and g.probation[i] == 0
-        if i >= 4:
-            used[i] = used[i] and not doubted[i]
-        elif doubted[i]:
-            doubtful += 1
+        believed = g.trust[i] != LOST and g.probation[i] == 0
+        doubted[i] = believed and abs(g.unseen[i]) > _DOUBT
+        if i < 4 and believed:
+            unseen += int(doubted[i])
             certain = certain or abs(g.unseen[i]) > _CERTAIN * g.max_unseen[i]
-        elif used[i]:
-            followed += 1
-            agreed = agreed and abs(g.believed[i] - g.length[i]) <= _AGREED
-    if agreed or certain or followed >= 2:
-        for i in range(4):
-            used[i] = used[i] and not doubted[i]
+            agreed = agreed and (doubted[i] or abs(g.believed[i] - g.length[i]) <= _AGREED)
+            contradicted += int(_residual_since(g, i) > _DOUBTFUL_RESIDUAL)
+    if unseen > 0 and (agreed or certain or (unseen == 1 and g.rigid)):
+        return UNSEEN
+    told = contradicted == 1 or contradicted == 2
+    for i in range(4):
+        doubted[i] = told and g.probation[i] == 0 and _residual_since(g, i) > _DOUBTFUL_RESIDUAL
+    return CONTRADICTED if told else 0
 
 
 @compiled
-def _gone(g: GuardArrays, i: int) -> bool:
-    """Whether an encoder that is not followed any more is too far from what it reads."""
-    if abs(g.unseen[i]) > g.max_unseen[i]:
-        return True
-    return bool(i < 4 and g.rigid and abs(_residual(g.believed) - g.residual_then[i]) > g.max_unseen[i])
-
-
-@compiled
-def _stick(g: GuardArrays, doubted: Flags, used: Flags) -> bool:
-    """Do without the encoders that are left out for too long; whether there are new ones."""
+def _stick(g: GuardArrays, doubted: Flags, doubt: int) -> bool:
+    """Do without the encoders that are doubted for too long; whether there are new ones."""
     found = False
     for i in range(6):
-        if doubted[i] and not used[i] and _gone(g, i):
+        gone = abs(g.unseen[i]) > g.max_unseen[i]
+        if i < 4 and doubt == CONTRADICTED:
+            gone = _residual_since(g, i) > 0.5 * g.max_unseen[i]
+        if doubted[i] and gone:
+            g.blamed[i], found = 1, True
+    for i in range(6):
+        if g.blamed[i] != 0 and doubted[i]:
             g.trust[i] = LOST
-            found, g.blamed[i] = True, 1
         if i >= 4 and g.trust[i] == LOST:
             observer.bound_disturbance(g, i - 3)
     if found:
@@ -217,7 +218,7 @@ def _out_of_range(g: GuardArrays) -> tuple[int, int]:
 def _contradiction(g: GuardArrays) -> bool:
     """Whether four gaps that are believed cannot be those of a rigid platen."""
     for i in range(4):
-        if g.trust[i] == LOST:
+        if g.trust[i] == LOST or g.probation[i] > 0:
             return False
     g.contradictions = g.contradictions + 1 if abs(_residual(g.believed)) > g.max_residual else 0
     return bool(g.contradictions >= _RESIDUAL_SAMPLES)
@@ -244,10 +245,11 @@ def _judge(g: GuardArrays, current: FloatArray, flying: bool) -> int:
     observer.predict(g, current)
     code = JUMP if _slips(g) else FINE
     _look(g, flying, counted)
-    _doubt(g, flying, doubted)
-    _choose(g, doubted, used)
-    if _stick(g, doubted, used) and code == FINE:
+    doubt = _doubt(g, flying, doubted)
+    if _stick(g, doubted, doubt) and code == FINE:
         code = STUCK
+    for i in range(6):
+        used[i] = g.trust[i] != LOST and g.probation[i] == 0 and not doubted[i]
     _follow_model(g, doubted, used)
     observer.correct(g, g.believed, used, counted)
     for i in range(6):
@@ -259,9 +261,7 @@ def _judge(g: GuardArrays, current: FloatArray, flying: bool) -> int:
 
 
 @compiled
-def watch(
-    block: Block, length: FloatArray, current: FloatArray, flying: bool
-) -> tuple[int, int]:
+def watch(block: Block, length: FloatArray, current: FloatArray, flying: bool) -> tuple[int, int]:
     """Judge one sample: ``length`` (6,), gaps 1..4, x, z [m], after ``current`` (12,) flowed [A].
 
     Returns a code and the first encoder, or the axis, it is about; ``blamed`` has all encoders.
@@ -337,14 +337,17 @@ class Guard:
 
     @property
     def blind(self) -> Flags:
-        """The axes y, x, z, phi, theta (5,) that no believed encoder shows."""
+        """The axes y, x, z, phi, theta (5,) that no encoder shows for sure.
+
+        What slipped once along x or z is believed, but not relied on.
+        """
         lost = self.arrays.trust == LOST
         along_z, along_x = 2 - np.count_nonzero(lost[:4:2]), 2 - np.count_nonzero(lost[1:4:2])
         return np.array(
             [
                 along_z + along_x == 0,
-                lost[4],
-                lost[5],
+                self.arrays.trust[4] != SOUND,
+                self.arrays.trust[5] != SOUND,
                 along_z == 0 or (along_z == 1 and along_x != 2),
                 along_x == 0 or (along_x == 1 and along_z == 0),
             ]

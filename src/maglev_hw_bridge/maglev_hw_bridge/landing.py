@@ -59,9 +59,7 @@ class LandingArrays(Record):
 
 
 @compiled
-def land(
-    block: Block, position: FloatArray, rate: FloatArray, disturbance: FloatArray
-) -> bool:
+def land(block: Block, position: FloatArray, rate: FloatArray, disturbance: FloatArray) -> bool:
     """Write the currents of the next sample of the way down; true when the landing is over.
 
     ``position``, ``rate`` and ``disturbance`` (5,) [m, rad] and by s and s². No motor gets more than the limit, and

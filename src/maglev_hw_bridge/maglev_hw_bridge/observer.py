@@ -89,17 +89,13 @@ def start(o: ObserverArrays, length: FloatArray) -> None:
         o.rate[axis] = o.disturbance[axis] = 0.0
         o.model_rate[axis] = o.least_rate[axis] = 0.0
         o.disturbance_then[axis] = o.still_time[axis] = 0.0
-    _foretell(o)
 
 
 @compiled
 def _foretell(o: ObserverArrays) -> None:
-    machine = machine_from_array(o.machine)
-    before = o.length.copy()
-    gaps_from_outputs(machine, o.position, o.length[:4])
-    o.length[4], o.length[5] = o.position[1], o.position[2]
-    for i in range(6):
-        o.step[i] = o.length[i] - before[i]
+    """What the encoders should read where the platen is."""
+    gaps_from_outputs(machine_from_array(o.machine), o.position, o.length[:4])
+    o.length[4], o.length[5] = o.position[X], o.position[Z]
 
 
 @compiled
@@ -113,7 +109,7 @@ def _push(o: ObserverArrays, current: FloatArray) -> tuple[float, float, float, 
             current[k], current[k + 1], current[k + 2], angle, o.scale
         )
     machine = machine_from_array(o.machine)
-    return output_accelerations(machine, o.position[0], o.position[3], o.position[4], i_d, i_q)
+    return output_accelerations(machine, o.position[Y], o.position[PHI], o.position[THETA], i_d, i_q)
 
 
 @compiled
@@ -136,6 +132,8 @@ def predict(o: ObserverArrays, current: FloatArray) -> None:
     """Carry on over one sample in which phase currents (12,) [A] flowed."""
     push = _push(o, current)
     seated = supported(o, Y)
+    _foretell(o)
+    before = o.length.copy()
     for axis in range(5):
         held = o.friction[axis]
         if axis == Y and seated:
@@ -144,6 +142,7 @@ def predict(o: ObserverArrays, current: FloatArray) -> None:
             held = math.inf
         _carry(o, axis, push[axis], held)
     _foretell(o)
+    o.step[:] = o.length - before
 
 
 @compiled
@@ -169,16 +168,35 @@ def _carry(o: ObserverArrays, axis: int, push: float, held: float) -> None:
 def correct(o: ObserverArrays, length: FloatArray, used: Flags, counted: Flags) -> None:
     """Take in what the encoders read: ``length`` (6,) [m], of which ``used`` (6,) are believed.
 
-    ``counted`` (6,): which of them changed. Two gaps of one pair tell y and their tilt; with less,
-    phi, which its spring keeps near zero, is left to the model first.
+    ``counted`` (6,): which of them changed.
     """
     innovation = np.zeros(6)
     for i in range(6):
         if used[i]:
             innovation[i] = _told(length[i] - o.length[i], o.count[i], counted[i])
+    _correct_vertical(o, innovation, used)
+    for axis in (X, Z):
+        if used[3 + axis]:
+            _amend(o, axis, innovation[3 + axis])
+        else:
+            _coast(o, axis)
+    vertical = counted[0] or counted[1] or counted[2] or counted[3]
+    for axis in range(5):
+        if counted[3 + axis] if axis in (X, Z) else vertical:
+            o.model_rate[axis], o.still_time[axis] = o.rate[axis], 0.0
+            o.disturbance_then[axis] = o.disturbance[axis]
+
+
+@compiled
+def _correct_vertical(o: ObserverArrays, innovation: FloatArray, used: Flags) -> None:
+    """Correct y and the tilts by the gaps.
+
+    Two gaps of one pair tell y and their tilt; with less, phi, which its spring keeps near zero, is
+    left to the model first.
+    """
+    r = machine_from_array(o.machine).r
     along_z, along_x = int(used[0]) + int(used[2]), int(used[1]) + int(used[3])
     mean_z, mean_x = innovation[0] + innovation[2], innovation[1] + innovation[3]
-    machine = machine_from_array(o.machine)
     if along_z == 2 and along_x == 2:
         y = 0.25 * (mean_z + mean_x)
     elif along_z == 2 or (along_z == 1 and along_x != 2):
@@ -190,22 +208,12 @@ def correct(o: ObserverArrays, length: FloatArray, used: Flags, counted: Flags) 
         tilt_z += y if used[0] else -y
     if along_x == 1:
         tilt_x += -y if used[1] else y
-    vertical = counted[0] or counted[1] or counted[2] or counted[3]
     if along_z + along_x > 0:
         _amend(o, Y, y)
     if along_z == 2 or (along_z == 1 and along_x == 2):
-        _amend(o, PHI, tilt_z / (along_z * machine.r))
+        _amend(o, PHI, tilt_z / (along_z * r))
     if along_x == 2 or (along_x == 1 and along_z > 0):
-        _amend(o, THETA, tilt_x / (along_x * machine.r))
-    for axis in (X, Z):
-        if used[3 + axis]:
-            _amend(o, axis, innovation[3 + axis])
-        else:
-            _coast(o, axis)
-    for axis in range(5):
-        if counted[3 + axis] if axis == X or axis == Z else vertical:
-            o.model_rate[axis], o.still_time[axis] = o.rate[axis], 0.0
-            o.disturbance_then[axis] = o.disturbance[axis]
+        _amend(o, THETA, tilt_x / (along_x * r))
 
 
 @compiled
@@ -220,7 +228,7 @@ def _told(innovation: float, count: float, counted: bool) -> float:
 def _amend(o: ObserverArrays, axis: int, error: float) -> None:
     o.position[axis] += o.gain[0] * error
     o.rate[axis] += o.gain[1] * error
-    if axis == X or axis == Z or not supported(o, Y):
+    if axis in (X, Z) or not supported(o, Y):
         o.disturbance[axis] += o.gain[2] * error
 
 

@@ -59,13 +59,14 @@ class FaultParameters:
         within=(1e-6, 0.1),
     )
     stuck_gap: float = parameter(
-        1e-4,
-        'a gap encoder is stuck when it should have moved this far without a count',
+        2e-4,
+        'a gap encoder is stuck when it should have moved this far without a count, or when '
+        'meanwhile the four have come to contradict each other by half of it',
         unit='m',
         within=(1e-6, 0.1),
     )
     stuck_horizontal: float = parameter(
-        1e-4,
+        1.5e-4,
         'x or z is stuck when it should have moved this far without a count',
         unit='m',
         within=(1e-6, 0.1),
@@ -122,10 +123,10 @@ class BridgeLandingParameters:
         1.0, 'time to descend to the lower stop', unit='s', within=(0.1, 60.0)
     )
     blind_braking_time: float = parameter(
-        0.1, 'the first where an axis is seen by no encoder', unit='s', within=(0.05, 10.0)
+        0.06, 'the first where an axis is seen by no encoder', unit='s', within=(0.05, 10.0)
     )
     blind_descent_time: float = parameter(
-        0.4, 'the second where an axis is seen by no encoder', unit='s', within=(0.1, 60.0)
+        0.28, 'the second where an axis is seen by no encoder', unit='s', within=(0.1, 60.0)
     )
     settle_time: float = parameter(
         0.2, 'time pressed on the stop before the end', unit='s', within=(0.0, 10.0)

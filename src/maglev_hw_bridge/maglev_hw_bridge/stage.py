@@ -220,7 +220,7 @@ class BridgeStage(StageLife):
             reason, remedy = faults.encoder_fault(code, self.guard)
             blind = self.guard.blind
             self._raise_fault('encoder', reason, remedy, cut=bool(blind[0]))
-            if self.mode is Mode.LANDING and blind.any():
+            if self.mode is Mode.LANDING and code != guard.RESIDUAL and blind.any():
                 self._begin_landing()
 
     def _late(self) -> None:

@@ -20,6 +20,9 @@ INTERRUPTED = -35
 SHOWS = np.array([30, 30, 30, 30, 40, 40])
 """Counts an encoder is off the truth from which on it must be found out."""
 
+_DISPENSABLE = 2
+"""Gap encoders that the model can stand in for."""
+
 SIZES = {'stuck': (0, 0), 'slip': (1, 50), 'jump': (51, 5000), 'noise': (5, 100), 'reset': (0, 0)}
 WHICH = {'a gap': 'gap', 'x or z': 'across', 'several': 'several'}
 
@@ -52,7 +55,7 @@ def encoders(name: str, which: str) -> Kind:
     def expected(fault: Fault) -> Expected:
         gaps = sum(target < 4 for target in fault.targets)
         lasting = name in ('stuck', 'noise')
-        hopeless = lasting and (gaps > 1 or len(fault.targets) > gaps)
+        hopeless = lasting and gaps > _DISPENSABLE
         names = '|'.join(rf'encoder {ENCODER_NAMES[target]}\b' for target in fault.targets)
         return Expected(CUT if hopeless else DEGRADED, 10, f'{names}|contradict')
 
