@@ -56,8 +56,9 @@ def encoders(name: str, which: str) -> Kind:
         gaps = sum(target < 4 for target in fault.targets)
         lasting = name in ('stuck', 'noise')
         hopeless = lasting and gaps > _DISPENSABLE
-        names = '|'.join(rf'encoder {ENCODER_NAMES[target]}\b' for target in fault.targets)
-        return Expected(CUT if hopeless else DEGRADED, 10, f'{names}|contradict')
+        one = f'(?:{"|".join(ENCODER_NAMES[target] for target in fault.targets)})'
+        blame = f'encoder {one}(?:, {one})* (?:jumped|is stuck)|contradict'
+        return Expected(CUT if hopeless else DEGRADED, 10, blame)
 
     return Kind(_row(name, which), draw, begin, expected)
 
