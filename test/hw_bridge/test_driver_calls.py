@@ -105,8 +105,10 @@ def test_an_expired_watchdog_is_honoured(board: int) -> None:
     driver.start()
     run(driver)
     module.cards[board].expire()
+    written = [len(card.written) for card in module.cards]
     with pytest.raises(WatchdogError, match='watchdog expired'):
         driver.write(np.ones(12))
+    assert [len(card.written) for card in module.cards] == written  # on neither board
     assert not np.any(module.cards[board].volts[:6])
     driver.close()
     assert 'watchdog_clear' in module.cards[board].calls
@@ -252,6 +254,22 @@ def test_a_sample_task_that_has_stopped_is_lost_boards(
     monkeypatch.setattr(type(module.cards[0]), 'task_read_encoder', lambda *_: got)
     with pytest.raises(DriverError, match='sample clock has stopped'):
         driver.read(np.zeros(6, dtype=np.int32))
+
+
+@pytest.mark.parametrize(('slower', 'late'), [(4e-4, False), (8e-4, True)])
+def test_boards_whose_clock_is_a_little_slow_are_not_late(slower: float, late: bool) -> None:
+    module = Module()
+    parameters = build(BridgeParameters, {})
+
+    def clock() -> float:
+        return module.cards[0].ticks * 1e-3 * (1.0 + slower)
+
+    driver = QuanserDriver(parameters, module, clock, module.sleep)
+    driver.open()
+    driver.start()
+    run(driver, 20_000)  # by the tick, 8 and 16 ms behind this machine's clock
+    assert (driver.late > parameters.boards.overrun) == late
+    driver.close()
 
 
 def test_it_gives_up_on_a_call_that_is_interrupted_for_ever() -> None:

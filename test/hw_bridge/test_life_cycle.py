@@ -320,8 +320,10 @@ def test_homing_by_word_only() -> None:
 
 
 def test_real_boards_are_not_homed_at_the_start() -> None:
+    real = build(BridgeParameters, {'driver': 'quanser', 'homing.at_start': True})
+    driver = bridge()[0].driver
     with pytest.raises(ParameterError, match=r'homing\.at_start.*lower stop'):
-        build(BridgeParameters, {'driver': 'quanser', 'homing.at_start': True})
+        BridgeStage(real, driver=driver)
 
 
 def test_an_emergency_stop_ends_the_landing_in_time() -> None:

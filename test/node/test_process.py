@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from maglev_node import process
+from maglev_node.node import NodeError
 from maglev_node.stage_node import StageNode
 
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -135,3 +136,18 @@ def test_a_defect_lands_or_releases(works: bool) -> None:
     )
     StageNode.rescue(node)
     assert done == (['lands'] if works else ['lands', 'released'])
+
+
+def test_a_stage_is_touched_only_once_its_place_is_taken() -> None:
+    touched: list[str] = []
+    stage = SimpleNamespace(configure=lambda: touched.append('boards'))
+
+    def claim(_topic: str, _kind: str) -> None:
+        raise NodeError('another one is there')
+
+    node: Any = SimpleNamespace(
+        parameters=None, _make_stage=lambda _: stage, _graph=SimpleNamespace(claim=claim)
+    )
+    with pytest.raises(NodeError):
+        StageNode.configure(node)
+    assert touched == []

@@ -58,7 +58,8 @@ class Commissioning:
         self._counts = np.zeros(6, dtype=np.int32)
 
     def run(self) -> None:
-        """All steps. Raises WrongError, StoppedError, DriverError, StageError."""
+        """All steps. Raises WrongError, StoppedError, DriverError, StageError, ParameterError."""
+        self._parameters.check_homing()
         self._memory.claim()
         try:
             self._remember()

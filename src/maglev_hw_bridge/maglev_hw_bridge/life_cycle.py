@@ -33,7 +33,7 @@ class StageLife(abc.ABC):
     """What becomes of the boards of a bridge."""
 
     def __init__(self, parameters: BridgeParameters, realtime: bool, driver: Driver | None) -> None:
-        """Raises StageError when the driver is not there, ParameterError when there is none."""
+        """Raises StageError when the driver is not there, ParameterError for what cannot be."""
         self.parameters = parameters
         self.sample_time = parameters.sample_time
         self.realtime = realtime
@@ -45,6 +45,7 @@ class StageLife(abc.ABC):
             self.driver = driver or make_driver(parameters, realtime)
         except DriverError as error:
             raise StageError(str(error)) from error
+        parameters.check_homing()
         self.encoders = Encoders(parameters)
         self.amplifiers = Amplifiers(parameters)
         self.guard = Guard(parameters)

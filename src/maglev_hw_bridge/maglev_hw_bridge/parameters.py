@@ -196,6 +196,9 @@ class BridgeParameters:
                 f"parameter 'boards.stop_time' is {self.boards.stop_time:g} s, a landing takes "
                 f'{longest:g} s'
             )
+
+    def check_homing(self) -> None:
+        """Refuse to home real boards at the start. Raises ParameterError."""
         if self.homing.at_start and self.driver != 'emulated':
             raise ParameterError(
                 f"parameter 'homing.at_start' is true with driver '{self.driver}': only an emulated"
