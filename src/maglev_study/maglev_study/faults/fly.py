@@ -63,6 +63,7 @@ class Course:
             if not self.begun[index] and elapsed >= fault.delay:
                 self.begun[index] = True
                 KINDS[fault.kind].begin(self.run, fault)
+                self.flight.world.refresh()
                 self.note()
 
     def note(self) -> None:

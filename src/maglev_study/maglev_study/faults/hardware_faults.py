@@ -10,6 +10,7 @@ import numpy as np
 from maglev_hw_bridge.emulated_card import HILError
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES
 from maglev_study.faults.kinds import CUT, DEGRADED, NOMINAL, Expected, Fault, Kind, Run
+from maglev_study.faults.programme import PHASES
 
 FOR_EVER = 10**9
 INTERRUPTED = -35
@@ -60,7 +61,9 @@ def encoders(name: str, which: str) -> Kind:
         blame = f'encoder {one}(?:, {one})* (?:jumped|is stuck)|contradict'
         return Expected(CUT if hopeless else DEGRADED, 10, blame)
 
-    return Kind(_row(name, which), draw, begin, expected)
+    lost_unseen = name in ('slip', 'jump', 'reset') and which != 'gap'
+    phases = tuple(phase for phase in PHASES if not (lost_unseen and phase == 'arming'))
+    return Kind(_row(name, which), draw, begin, expected, phases)
 
 
 def _row(name: str, which: str) -> str:

@@ -113,6 +113,10 @@ class World(EmulatedBoards):
         for proxy in self._proxies:
             proxy.update()
 
+    def refresh(self) -> None:
+        """What counters have lost shows at once, not at the next sample only."""
+        self._count()
+
     def process_ended(self) -> None:
         """The bridge's process is gone: the system closes the handles it has left open."""
         self.cards.clear()
@@ -164,7 +168,6 @@ class World(EmulatedBoards):
 
     def cure(self) -> None:
         """Everything is sound from now on; what counters have lost stays lost."""
-        self._held = self._held - 0
         self.stuck[:] = False
         self.noise[:] = 0
         self.stuck_on[:] = np.nan
