@@ -101,8 +101,9 @@ class Judge:
             self.cut_by_itself = fault.cut
 
     def on_course(self, wanted: FloatArray) -> None:
-        """The platen should be near ``wanted`` (5,) [m, rad]."""
-        self._course[self._n - 1] = wanted[:3]
+        """The platen should be near ``wanted`` (5,) [m, rad], once it has left the stop."""
+        if self._aloft(self._n - 1):
+            self._course[self._n - 1] = wanted[:3]
 
     def notice(self, reason: str) -> None:
         """The bridge has found something out."""

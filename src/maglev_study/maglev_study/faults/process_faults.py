@@ -172,6 +172,8 @@ def heat(run: Run, fault: Fault) -> None:
 
 
 def second(run: Run, fault: Fault) -> None:
+    if not run.flight.world.cards:
+        return  # the first has not opened them yet
     other = Bridge(run.flight.parameters, run.flight.world)
     if other.configure():
         other.stray = 'a second bridge had the boards of the first'
