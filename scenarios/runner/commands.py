@@ -20,6 +20,7 @@ from runner.options import (
     namespace,
     one_of,
     seconds,
+    whole,
 )
 from runner.overlays import PARAMS, SECTIONS, check_overlay, overlay
 from runner.paper_tables import fly_all
@@ -67,6 +68,12 @@ COMPARE = """\
 Flies all control laws over the same steps, ellipses, disturbances and mismatches on the benchmark
 plant, prints one table and draws their regions of operation. A few minutes on two cores."""
 HEARD_BY_COMPARE = ('controller', 'plant', '**')
+FAULTS = """\
+The hardware bridge on emulated boards under every fault in every phase, judged by what truly
+happens: thousands of runs, faster than real time, without ROS; one page at the end. About ten runs
+a second and core.
+
+Exits with 1 when a rule is broken; each failure can be flown again by its seed."""
 COMMISSION = """\
 Brings a machine up step by step at low current and says what is wired or set wrongly. Without an
 overlay it runs on the emulated boards."""
@@ -225,6 +232,24 @@ def _compare(options: Sequence[str]) -> Job:
     return partial(_become, 'maglev_study', 'compare', arguments, overlays, HEARD_BY_COMPARE)
 
 
+def _faults(options: Sequence[str]) -> Job:
+    table = {
+        '--runs': Option('how many runs (default 3000)', 'N', whole),
+        '--seed': Option('of the first run; the others count up (default 0)', 'S', whole),
+        '--jobs': Option('processes (default: one for each core)', 'J', whole),
+        '--double': Option('a second fault up to 0.5 s after the first'),
+        '--short': Option('one run of each cell of fault and phase'),
+        '--replay': Option(
+            'fly one run alone and draw it: fault, detection, landing', 'SEED|FILE.json'
+        ),
+        '--out': _out_option('the page is', 'faults'),
+    }
+    given = Command('faults.sh', FAULTS, table).parse(options)
+    arguments = ['--out', str(_out('faults', given))]
+    arguments += _as_given(given, '--runs', '--seed', '--jobs', '--double', '--short', '--replay')
+    return partial(_become, 'maglev_study', 'faults', arguments)
+
+
 def _commission(options: Sequence[str]) -> Job:
     where = 'parameters of hw_bridge, from the current folder or from params/;'
     current = 'largest current of a phase alone, 0.2 to 3 A (default 1.5)'
@@ -270,5 +295,6 @@ COMMANDS: dict[str, Callable[[Sequence[str]], Job]] = {
     'trajectory': _trajectory,
     'paper_tables': _paper_tables,
     'compare': _compare,
+    'faults': _faults,
     'commission': _commission,
 }

@@ -93,6 +93,13 @@ def seconds(name: str, value: str) -> str:
     return f'{value}0' if '.' in value else f'{value}.0'
 
 
+def whole(name: str, value: str) -> str:
+    """A whole number, 0 or above."""
+    if not re.fullmatch('[0-9]+', value):
+        raise WrongUseError(f"{name} is '{value}', it must be a whole number")
+    return value
+
+
 def namespace(name: str, value: str) -> str:
     """A namespace of ROS, made absolute."""
     full = value if value.startswith('/') else f'/{value}'

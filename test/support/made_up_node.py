@@ -32,6 +32,19 @@ class Topic:
         self.newest = message
 
 
+class Timer:
+    """Ticks, or was cancelled."""
+
+    def __init__(self, period: float) -> None:
+        self.period, self.timer_period_ns, self.ticking = period, 0, True
+
+    def cancel(self) -> None:
+        self.ticking = False
+
+    def reset(self) -> None:
+        self.ticking = True
+
+
 class Inbox:
     """The queue of currents in real time."""
 

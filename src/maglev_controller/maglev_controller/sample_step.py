@@ -185,7 +185,9 @@ def _currents(
     settings: Record, machine: Machine, sample: Record, direct: FloatArray, quadrature: FloatArray
 ) -> int:
     """The inverse of the settings, from w; what limited the currents."""
-    limits = CurrentLimits(settings.current, settings.levitation_first, settings.least_attraction)
+    limits = CurrentLimits(
+        settings.current, settings.levitation_first, settings.least_attraction, 0.5
+    )
     controlled, wanted = settings.controlled, sample.virtual_input
     answer = Answer(direct, quadrature, sample.realised, sample.excess)
     if settings.inverse == EXACT:

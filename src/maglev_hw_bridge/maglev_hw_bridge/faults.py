@@ -26,15 +26,15 @@ def range_fault(code: int, index: int, watched: Guard) -> tuple[str, str]:
     return f'{name} is {value * 1e3:.3f} {unit}, outside its soft range', 'check the reference'
 
 
-def encoder_fault(code: int, index: int, watched: Guard) -> tuple[str, str]:
+def encoder_fault(code: int, watched: Guard) -> tuple[str, str]:
     """Reason and remedy of encoders that cannot be believed, by the code of ``watch``."""
     if code == guard.RESIDUAL:
         reason = f'the gaps contradict each other by {watched.residual * 1e6:.0f} um'
         return reason, 'check the gap encoders, home again'
-    name = ENCODER_NAMES[index]
+    names = ', '.join(ENCODER_NAMES[i] for i in watched.blamed)
     if code == guard.JUMP:
-        return f'encoder {name} jumped', 'check its cable, home again'
-    return f'encoder {name} is stuck, or its motors are', 'check its cable and the phases'
+        return f'encoder {names} jumped', 'check its cable, home again'
+    return f'encoder {names} is stuck, or its motors are', 'check its cable and the phases'
 
 
 def command_fault(
@@ -87,6 +87,9 @@ def remaining_cause(
     """What still speaks against clearing a fault, or nothing."""
     if stop_pressed:
         return 'the emergency stop is pressed'
+    if watched.failed:
+        names = ', '.join(ENCODER_NAMES[i] for i in watched.failed)
+        return f'encoder {names} lost counts: home again'
     if abs(watched.residual) > parameters.fault.residual:
         return f'g1 + g3 - g2 - g4 is {watched.residual * 1e6:.0f} um: home again'
     if amplifier.load > parameters.amplifier.derate_load:

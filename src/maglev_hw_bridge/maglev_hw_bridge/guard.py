@@ -1,8 +1,9 @@
-"""What is watched at every sample: whether the encoders can be believed and where the platen is.
+"""What is watched at every sample: which encoders can be believed, and where the platen is.
 
-The first encoder that fails can mostly be done without, long enough for a landing: a rigid platen's
-gap follows from the other three, and what x or z jumped by is known. A second one cannot, nor x or
-z that stands still in motion, nor gaps that contradict each other and none stands out.
+The observer foretells what each encoder reads next. A reading that leaps away from that slipped: it
+is put right by as much and goes on being believed, until it leaps again. One that stands still while
+the observer sees the platen move is stuck, and done without. With one gap in doubt the other three
+show how the platen moves; with more, the model must agree with those that are left.
 """
 
 from __future__ import annotations
@@ -10,14 +11,16 @@ from __future__ import annotations
 import math
 from typing import Annotated, Final
 
+import numpy as np
+from numpy.typing import NDArray
+
+from maglev_hw_bridge import observer
+from maglev_hw_bridge.observer import Flags, ObserverArrays
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_model.axes import FloatArray
+from maglev_model.axes import PHI, THETA, FloatArray, X, Y, Z
 from maglev_model.compiled import compiled
-from maglev_model.machine import machine_constants
-from maglev_model.machine_array import MachineArray, machine_from_array
-from maglev_model.motor import attraction_coefficients
-from maglev_model.platen import outputs_from_gaps
-from maglev_model.records import Block, Record
+from maglev_model.machine_array import machine_from_array
+from maglev_model.records import Block
 
 # What watch() returns.
 FINE: Final = 0
@@ -27,56 +30,48 @@ RESIDUAL: Final = 3
 GAP_RANGE: Final = 4
 RANGE: Final = 5
 
-NONE: Final = -1
-"""No encoder is done without."""
+# What speaks against encoders that stand still.
+UNSEEN: Final = 1
+CONTRADICTED: Final = 2
 
-_AHEAD = 1e-3  # [s]
-_SLOW_BANDWIDTH = 100.0  # [rad/s]
+# What an encoder is.
+SOUND: Final = 0
+PUT_RIGHT: Final = 1  # after a slip
+LOST: Final = 2
+
 _RESIDUAL_SAMPLES = 2
-_SLIP = 1e-4  # [m]
-_STOP_MARGIN = 3e-4  # this near a horizontal stop a force need not move the platen [m]
+_PROBATION = 20  # samples after a slip in which noise would leap again
+_SETTLING = 100  # samples in which the disturbance is found
+_DOUBT = 2.5e-5  # an encoder that should have moved this far is not followed [m]
+_CERTAIN = 1.5  # as many times max_unseen it is stuck whatever the others read
+_DOUBTFUL_RESIDUAL = 6e-5  # [m]
+_GROUND = 1e-3  # this near the lower stop nothing is at stake any more [m]
+_AGREED = 2e-5  # how near the others must read to what is foretold then [m]
 
 
-class GuardArrays(Record):
+class GuardArrays(ObserverArrays):
     """What :func:`watch` takes: bounds, and what it has seen; lengths are gaps 1..4, x, z [m]."""
 
-    machine: MachineArray
-    period: float  # [s]
-    rate_gain: float  # share of a new difference quotient in the rate
-    slow_rate_gain: float  # likewise in the rate that a stuck encoder is judged by
     max_jump: float  # [m]
     max_residual: float  # [m]
-    max_unseen_gap: float  # [m]
-    max_unseen: float  # [m]
-    friction: float  # [m/s²]
+    max_unseen: Annotated[FloatArray, 6]  # [m]
     gap_lower: float  # [m]
     gap_upper: float  # [m]
-    horizontal_stop: Annotated[FloatArray, 2]  # of x, z [m]
-    lower: Annotated[FloatArray, 5]  # y, x, z, phi, theta [m, rad]
-    upper: Annotated[FloatArray, 5]
+    soft_lower: Annotated[FloatArray, 5]  # y, x, z, phi, theta [m, rad]
+    soft_upper: Annotated[FloatArray, 5]
 
-    believed: Annotated[FloatArray, 6]  # lengths, put right where one encoder fails
-    mended: int  # the encoder that is done without, or NONE
-    offset: float  # what x or z reads too much [m]
-    just_mended: bool  # since this sample
-    past: Annotated[FloatArray, 2, 6]  # believed lengths of the last sample and the one before
+    trust: Annotated[NDArray[np.int8], 6]  # SOUND, PUT_RIGHT or LOST
+    probation: Annotated[NDArray[np.int8], 6]  # samples that a slip is not followed yet
+    offset: Annotated[FloatArray, 6]  # what an encoder reads too much [m]
+    blamed: Annotated[NDArray[np.int8], 6]  # found wrong in this sample
     samples: int  # seen
     contradictions: int  # samples in a row with too large a residual
     residual: float  # g1 + g3 - g2 - g4 as it is read [m]
-    # Gaps: what the other three told at its last change; x, z: how far it should have moved since.
-    still: Annotated[FloatArray, 6]
-    slow_rate: Annotated[FloatArray, 2]  # of x, z, that a stuck encoder is judged by [m/s]
-    i_q: Annotated[FloatArray, 4]  # put out last [A]
-    position: Annotated[FloatArray, 5]  # y, x, z, phi, theta [m, rad]
-    rate: Annotated[FloatArray, 5]  # [m/s, rad/s]
-    gap_rate: Annotated[FloatArray, 4]  # [m/s]
-
-
-@compiled
-def _others(length: FloatArray, i: int) -> float:
-    """Gap ``i`` from the other three, which a rigid platen determines."""
-    opposite = (i + 2) % 4
-    return float(length[(i + 1) % 4] + length[(i + 3) % 4] - length[opposite])
+    believed: Annotated[FloatArray, 6]  # lengths, put right or by the observer
+    past: Annotated[FloatArray, 2, 6]  # believed lengths of the last sample and the one before
+    rigid: bool  # whether four believed gaps must be those of a rigid platen
+    residual_then: Annotated[FloatArray, 4]  # when a gap encoder counted last [m]
+    unseen: Annotated[FloatArray, 6]  # how far it should have moved at least since its last count
 
 
 @compiled
@@ -85,169 +80,210 @@ def _residual(length: FloatArray) -> float:
 
 
 @compiled
-def _stuck_gap(g: GuardArrays, length: FloatArray) -> int:
-    """The gap encoder that stands still although the other three see it move, or -1.
+def _least_step(g: GuardArrays, i: int) -> float:
+    """How far an encoder should at least move in this sample by the model alone [m]."""
+    rate = g.least_rate
+    if i >= 4:
+        return float(g.period * rate[i - 3])
+    tilt = machine_from_array(g.machine).r * (rate[PHI] if i % 2 == 0 else -rate[THETA])
+    return float(g.period * (rate[Y] + (tilt if i >= 2 else -tilt)))
 
-    What one of the others slips in a single sample is no motion.
+
+@compiled
+def _at_rest(g: GuardArrays, i: int) -> bool:
+    """Whether friction, or the lower stop, may hold an encoder where it is."""
+    if not g.rigid and g.position[Y] > g.upper[Y] - _GROUND:
+        return True
+    if i >= 4:
+        return bool(g.least_rate[i - 3] == 0.0)
+    return bool(g.least_rate[Y] == 0.0 and g.least_rate[PHI if i % 2 == 0 else THETA] == 0.0)
+
+
+@compiled
+def _slips(g: GuardArrays) -> bool:
+    """Find and put right what leaps; whether there is some."""
+    found = False
+    for i in range(6):
+        step = g.believed[i] - g.past[0, i]
+        error = step - g.step[i]
+        again = step - (g.past[0, i] - g.past[1, i])
+        away = g.probation[i] == 1 and abs(g.believed[i] - g.length[i]) > g.max_jump
+        if g.trust[i] == LOST or (min(abs(error), abs(again)) <= g.max_jump and not away):
+            continue
+        found, g.blamed[i] = True, 1
+        if g.trust[i] == PUT_RIGHT:
+            g.trust[i] = LOST
+        else:
+            g.trust[i], g.probation[i] = PUT_RIGHT, _PROBATION
+            g.offset[i] += error
+            g.believed[i] -= error
+    return found
+
+
+@compiled
+def _look(g: GuardArrays, flying: bool, counted: Flags) -> None:
+    """Which encoders counted, and how far each of the others should have moved since it did."""
+    residual = _residual(g.believed)
+    for i in range(6):
+        counted[i] = g.trust[i] != LOST and g.believed[i] != g.past[0, i]
+        if counted[i] or not flying or g.samples < _SETTLING or _at_rest(g, i):
+            g.unseen[i] = 0.0
+        else:
+            g.unseen[i] += _least_step(g, i)
+        if i < 4 and (counted[i] or not g.rigid):
+            g.residual_then[i] = residual
+        g.probation[i] = max(g.probation[i] - 1, 0)
+
+
+@compiled
+def _residual_since(g: GuardArrays, i: int) -> float:
+    """What four believed gaps contradict each other by since an encoder's last count [m]."""
+    return abs(_residual(g.believed) - g.residual_then[i]) if i < 4 and g.rigid else 0.0
+
+
+@compiled
+def _doubt(g: GuardArrays, flying: bool, doubted: Flags) -> int:
+    """Which encoders stand still, ``doubted`` (6,), where others or the model say they should not.
+
+    The model is believed against gap encoders when it agrees with the others, or when three of them
+    tell without it; otherwise a residual says that some of those are wrong that do not count, where
+    it can be one or two. Returns what it was: UNSEEN, CONTRADICTED or 0.
     """
-    slip = _residual(length) - _residual(g.past[0])
+    g.rigid = flying
     for i in range(4):
-        others = _others(length, i)
-        if abs(slip) > _SLIP:
-            g.still[i] += others - _others(g.past[0], i)
-        if g.samples == 0 or length[i] != g.past[0, i]:
-            g.still[i] = others
-        elif abs(others - g.still[i]) > g.max_unseen_gap:
-            return i
-    return -1
-
-
-@compiled
-def _push(g: GuardArrays, length: FloatArray, axis: int) -> float:
-    """Acceleration of x (0) or z (1) by the currents put out last, (1), (6) [m/s²]."""
-    machine = machine_from_array(g.machine)
-    force = 0.0
-    for motor in range(1 - axis, 4, 2):
-        gap = min(max(length[motor], g.gap_lower), g.gap_upper)
-        _, _, k_h = attraction_coefficients(machine, gap)
-        force -= k_h * g.i_q[motor]
-    return float(force / (machine.M_x if axis == 0 else machine.M_z))
-
-
-@compiled
-def _stuck_horizontal(g: GuardArrays, length: FloatArray, axis: int) -> bool:
-    """Whether x (0) or z (1) stands still although speed and force should have moved it.
-
-    The speed follows the force and, while the encoder counts, what it counts.
-    """
-    if g.samples == 0:
-        return False
-    i, period = 4 + axis, g.period
-    step = length[i] - g.past[0, i]
-    speed = g.slow_rate[axis] + _push(g, length, axis) * period
-    if step != 0.0 or abs(length[i]) > g.horizontal_stop[axis] - _STOP_MARGIN:
-        g.slow_rate[axis] = speed + g.slow_rate_gain * (step / period - speed)
-        g.still[i] = 0.0
-        return False
-    speed = math.copysign(max(abs(speed) - g.friction * period, 0.0), speed)
-    g.slow_rate[axis] = speed
-    g.still[i] += speed * period
-    return bool(abs(g.still[i]) > g.max_unseen)
-
-
-@compiled
-def _believe(g: GuardArrays, length: FloatArray) -> None:
-    """Fill in what is believed of the lengths (6,) that are read [m]."""
-    g.believed[:] = length
-    if g.mended >= 4:
-        g.believed[g.mended] -= g.offset
-    elif g.mended != NONE:
-        g.believed[g.mended] = _others(length, g.mended)
-
-
-@compiled
-def _mend(g: GuardArrays, length: FloatArray, code: int, encoder: int) -> bool:
-    """Do without an encoder from now on; whether that can be done."""
-    if g.mended != NONE or (code == STUCK and encoder >= 4):
-        return False
-    g.mended, g.just_mended = encoder, True
-    if encoder >= 4:
-        g.offset = length[encoder] - _foreseen(g, encoder)
-    else:
-        g.gap_rate[encoder] = _others(g.gap_rate, encoder)
-    _believe(g, length)
-    return True
-
-
-@compiled
-def _estimate(g: GuardArrays) -> None:
-    """Update position and rate from the believed lengths."""
-    machine = machine_from_array(g.machine)
-    before = g.position.copy()
-    outputs_from_gaps(machine, g.believed[:4], g.believed[4], g.believed[5], g.position)
-    if g.samples == 0:
-        return
-    gain, period = g.rate_gain, g.period
-    for axis in range(5):
-        g.rate[axis] += gain * ((g.position[axis] - before[axis]) / period - g.rate[axis])
+        g.rigid = g.rigid and g.trust[i] != LOST and g.probation[i] == 0
+    unseen = contradicted = 0
+    agreed, certain = True, False
+    for i in range(6):
+        believed = g.trust[i] != LOST and g.probation[i] == 0
+        doubted[i] = believed and abs(g.unseen[i]) > _DOUBT
+        if i < 4 and believed:
+            unseen += int(doubted[i])
+            certain = certain or abs(g.unseen[i]) > _CERTAIN * g.max_unseen[i]
+            agreed = agreed and (doubted[i] or abs(g.believed[i] - g.length[i]) <= _AGREED)
+            contradicted += int(_residual_since(g, i) > _DOUBTFUL_RESIDUAL)
+    if unseen > 0 and (agreed or certain or (unseen == 1 and g.rigid)):
+        return UNSEEN
+    told = contradicted == 1 or contradicted == 2
     for i in range(4):
-        quotient = (g.believed[i] - g.past[0, i]) / period
-        g.gap_rate[i] += gain * (quotient - g.gap_rate[i])
+        doubted[i] = told and g.probation[i] == 0 and _residual_since(g, i) > _DOUBTFUL_RESIDUAL
+    return CONTRADICTED if told else 0
 
 
 @compiled
-def _estimate_mended(g: GuardArrays) -> None:
-    """Position and rate when one gap has just been found not to be what was read for a while."""
-    machine = machine_from_array(g.machine)
-    outputs_from_gaps(machine, g.believed[:4], g.believed[4], g.believed[5], g.position)
-    ahead = g.position.copy()
-    gaps = g.believed[:4] + _AHEAD * g.gap_rate
-    outputs_from_gaps(machine, gaps, g.believed[4], g.believed[5], ahead)
-    for axis in (0, 3, 4):
-        g.rate[axis] = (ahead[axis] - g.position[axis]) / _AHEAD
+def _stick(g: GuardArrays, doubted: Flags, doubt: int) -> bool:
+    """Do without the encoders that are doubted for too long; whether there are new ones."""
+    found = False
+    for i in range(6):
+        gone = abs(g.unseen[i]) > g.max_unseen[i]
+        if i < 4 and doubt == CONTRADICTED:
+            gone = _residual_since(g, i) > 0.5 * g.max_unseen[i]
+        if doubted[i] and gone:
+            g.blamed[i], found = 1, True
+    for i in range(6):
+        if g.blamed[i] != 0 and doubted[i]:
+            g.trust[i] = LOST
+        if i >= 4 and g.trust[i] == LOST:
+            observer.bound_disturbance(g, i - 3)
+    if found:
+        observer.bound_disturbance(g, PHI)
+        observer.bound_disturbance(g, THETA)
+    return found
 
 
 @compiled
-def _out_of_range(g: GuardArrays, length: FloatArray) -> tuple[int, int]:
+def _follow_model(g: GuardArrays, doubted: Flags, used: Flags) -> None:
+    """What no encoder shows now, because it stands still, moves as the model alone says."""
+    for axis in (X, Z):
+        if doubted[3 + axis]:
+            observer.alone(g, axis)
+    doubtful = doubted[0] or doubted[1] or doubted[2] or doubted[3]
+    if doubtful and not (used[0] or used[1] or used[2] or used[3]):
+        for axis in (Y, PHI, THETA):
+            observer.alone(g, axis)
+
+
+@compiled
+def _out_of_range(g: GuardArrays) -> tuple[int, int]:
     for axis in range(5):
-        if not g.lower[axis] <= g.position[axis] <= g.upper[axis]:
+        if not g.soft_lower[axis] <= g.position[axis] <= g.soft_upper[axis]:
             return RANGE, axis
     for i in range(4):
-        if not g.gap_lower <= length[i] <= g.gap_upper:
+        if not g.gap_lower <= g.believed[i] <= g.gap_upper:
             return GAP_RANGE, i
     return FINE, 0
 
 
 @compiled
-def _foreseen(g: GuardArrays, i: int) -> float:
-    """What the two samples before foretell of a length [m]."""
-    return float(2.0 * g.past[0, i] - g.past[1, i])
+def _contradiction(g: GuardArrays) -> bool:
+    """Whether four gaps that are believed cannot be those of a rigid platen."""
+    for i in range(4):
+        if g.trust[i] == LOST or g.probation[i] > 0:
+            return False
+    g.contradictions = g.contradictions + 1 if abs(_residual(g.believed)) > g.max_residual else 0
+    return bool(g.contradictions >= _RESIDUAL_SAMPLES)
 
 
 @compiled
-def _unbelievable(g: GuardArrays, length: FloatArray, flying: bool) -> tuple[int, int]:
+def _begin(g: GuardArrays) -> None:
+    """Take the first samples for the platen's position and rate."""
+    if g.samples == 0:
+        observer.start(g, g.believed)
+        g.past[0] = g.believed
+        g.residual_then[:] = _residual(g.believed)
+    else:
+        before = g.position.copy()
+        observer.start(g, g.believed)
+        for axis in range(5):
+            g.rate[axis] = g.model_rate[axis] = (g.position[axis] - before[axis]) / g.period
+
+
+@compiled
+def _judge(g: GuardArrays, current: FloatArray, flying: bool) -> int:
+    """Predict, find what is wrong with the encoders, correct; returns a code."""
+    counted, doubted, used = np.empty(6, np.bool_), np.empty(6, np.bool_), np.empty(6, np.bool_)
+    observer.predict(g, current)
+    code = JUMP if _slips(g) else FINE
+    _look(g, flying, counted)
+    doubt = _doubt(g, flying, doubted)
+    if _stick(g, doubted, doubt) and code == FINE:
+        code = STUCK
     for i in range(6):
-        if i < 4 and i == g.mended:
-            continue
-        if g.samples >= 2 and abs(length[i] - _foreseen(g, i)) > g.max_jump:
-            return JUMP, i
-    stuck = _stuck_gap(g, length)
-    for axis in range(2):
-        if _stuck_horizontal(g, length, axis):
-            stuck = 4 + axis
-    if flying and stuck >= 0:
-        return STUCK, stuck
-    return FINE, 0
+        used[i] = g.trust[i] != LOST and g.probation[i] == 0 and not doubted[i]
+    _follow_model(g, doubted, used)
+    observer.correct(g, g.believed, used, counted)
+    for i in range(6):
+        if g.trust[i] == LOST:
+            g.believed[i] = g.length[i]
+    if _contradiction(g) and code == FINE:
+        code = RESIDUAL
+    return code
 
 
 @compiled
-def watch(block: Block, length: FloatArray, flying: bool) -> tuple[int, int]:
-    """Judge one sample: ``length`` (6,), gaps 1..4, x, z [m]; updates position and rate.
+def watch(block: Block, length: FloatArray, current: FloatArray, flying: bool) -> tuple[int, int]:
+    """Judge one sample: ``length`` (6,), gaps 1..4, x, z [m], after ``current`` (12,) flowed [A].
 
-    Returns a code and the encoder or axis it is about; ``mended`` tells whether the encoder is done
-    without from now on. Range and stuck encoders count in flight.
+    Returns a code and the first encoder, or the axis, it is about; ``blamed`` has all encoders.
+    Updates position, rate and what is believed. Range and stuck encoders count in flight.
     """
     g: GuardArrays = block[0]
     g.residual = _residual(length)
-    g.just_mended = False
-    _believe(g, length)
-    code, index = _unbelievable(g, g.believed, flying)
-    if code == STUCK and _mend(g, length, code, index):
-        _estimate_mended(g)
-    else:
-        if code == JUMP:
-            _mend(g, length, code, index)
-        _estimate(g)
-    contradicting = abs(_residual(g.believed)) > g.max_residual
-    g.contradictions = g.contradictions + 1 if contradicting else 0
-    if code == FINE and g.contradictions >= _RESIDUAL_SAMPLES:
-        code = RESIDUAL
-    if code == FINE and flying:
-        code, index = _out_of_range(g, g.believed)
     for i in range(6):
-        g.past[1, i] = g.past[0, i] if g.samples > 0 else g.believed[i]
-        g.past[0, i] = g.believed[i]
-    g.samples += 1
+        g.blamed[i] = 0
+        g.believed[i] = length[i] - g.offset[i]
+    code, index = FINE, 0
+    if g.samples < 2:
+        _begin(g)
+    else:
+        code = _judge(g, current, flying)
+        for i in range(5, -1, -1):
+            if g.blamed[i] != 0:
+                index = i
+    if code == FINE and flying:
+        code, index = _out_of_range(g)
+    g.past[1], g.past[0] = g.past[0], g.believed
+    g.samples = g.samples + 1 if math.isfinite(np.sum(g.position)) else 0
     return code, index
 
 
@@ -255,37 +291,34 @@ class Guard:
     """Watches the encoders; :attr:`arrays` serve compiled code."""
 
     def __init__(self, parameters: BridgeParameters) -> None:
-        fault, machine = parameters.fault, parameters.machine
-        period = parameters.sample_time
+        fault = parameters.fault
         self.arrays = GuardArrays(
-            machine=machine_constants(machine),
-            period=period,
-            rate_gain=-math.expm1(-parameters.landing.rate_bandwidth * period),
-            slow_rate_gain=-math.expm1(-_SLOW_BANDWIDTH * period),
+            **observer.observer_fields(parameters),
             max_jump=fault.jump,
             max_residual=fault.residual,
-            max_unseen_gap=fault.stuck_gap,
-            max_unseen=fault.stuck_horizontal,
-            friction=fault.friction,
+            max_unseen=(fault.stuck_gap,) * 4 + (fault.stuck_horizontal,) * 2,
             gap_lower=fault.gap_lower,
             gap_upper=fault.gap_upper,
-            horizontal_stop=(machine.x_max, machine.z_max),
-            lower=fault.lower,
-            upper=fault.upper,
-            mended=NONE,
+            soft_lower=fault.lower,
+            soft_upper=fault.upper,
         )
 
     def forget(self) -> None:
-        """Begin anew: the next sample is the first."""
+        """Begin anew with the next sample; what an encoder lost it has lost until :meth:`trust`."""
         g = self.arrays
         g.samples = g.contradictions = 0
-        g.mended, g.offset, g.just_mended = NONE, 0.0, False
-        for array in (g.slow_rate, g.rate, g.gap_rate, g.i_q, g.still):
-            array[:] = 0.0
+        g.unseen[:] = g.rate[:] = 0.0
 
-    def watch(self, length: FloatArray, flying: bool) -> tuple[int, int]:
+    def trust(self) -> None:
+        """Believe every encoder again: they have just been homed."""
+        self.forget()
+        self.arrays.trust[:] = SOUND
+        self.arrays.probation[:] = 0
+        self.arrays.offset[:] = 0.0
+
+    def watch(self, length: FloatArray, current: FloatArray, flying: bool) -> tuple[int, int]:
         """Judge one sample; see :func:`watch`."""
-        return watch(self.arrays.block, length, flying)
+        return watch(self.arrays.block, length, current, flying)
 
     @property
     def residual(self) -> float:
@@ -293,6 +326,29 @@ class Guard:
         return self.arrays.residual
 
     @property
-    def mended(self) -> bool:
-        """Whether what the last sample found wrong with an encoder is put right from then on."""
-        return self.arrays.just_mended
+    def blamed(self) -> list[int]:
+        """The encoders that were found wrong in the last sample."""
+        return [int(i) for i in np.flatnonzero(self.arrays.blamed)]
+
+    @property
+    def failed(self) -> list[int]:
+        """The encoders whose zero is lost: they slipped or stood still."""
+        return [int(i) for i in np.flatnonzero(self.arrays.trust)]
+
+    @property
+    def blind(self) -> Flags:
+        """The axes y, x, z, phi, theta (5,) that no encoder shows for sure.
+
+        What slipped once along x or z is believed, but not relied on.
+        """
+        lost = self.arrays.trust == LOST
+        along_z, along_x = 2 - np.count_nonzero(lost[:4:2]), 2 - np.count_nonzero(lost[1:4:2])
+        return np.array(
+            [
+                along_z + along_x == 0,
+                self.arrays.trust[4] != SOUND,
+                self.arrays.trust[5] != SOUND,
+                along_z == 0 or (along_z == 1 and along_x != 2),
+                along_x == 0 or (along_x == 1 and along_z == 0),
+            ]
+        )

@@ -11,6 +11,7 @@ from typing import Annotated
 
 import numpy as np
 
+from maglev_hw_bridge.observer import Flags
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
@@ -24,6 +25,12 @@ from maglev_model.records import Block, Record
 LEAST_ATTRACTION = 0.1
 """Share of the weight that is always carried, so that the tilts keep authority."""
 
+SEEING: Flags = np.zeros(5, np.bool_)
+"""No axis is blind."""
+
+_CARRY = np.array([0.0, -1.0, 1.0, -2.0, 2.0])
+"""By blind axis, whether motors 1 and 3 are to carry (1) or motors 2 and 4 (-1)."""
+
 _BRAKING_UPWARD = 0.1  # of y [s]
 _FREE_STEP = 1e-4  # of the motion without current [s]
 _LONGEST_FALL = 10.0  # [s]
@@ -34,6 +41,7 @@ class LandingArrays(Record):
 
     machine: MachineArray
     current_limit: float  # of a motor [A]
+    along_z: float  # share of the attraction that motors 1 and 3 have
     stiffness: Annotated[FloatArray, 5]  # [1/s²]
     damping: Annotated[FloatArray, 5]  # [1/s]
     offset: Annotated[FloatArray, 5]  # of the start from where braking ends [m, rad]
@@ -51,10 +59,10 @@ class LandingArrays(Record):
 
 
 @compiled
-def land(block: Block, position: FloatArray, rate: FloatArray) -> bool:
+def land(block: Block, position: FloatArray, rate: FloatArray, disturbance: FloatArray) -> bool:
     """Write the currents of the next sample of the way down; true when the landing is over.
 
-    ``position`` and ``rate`` (5,) [m, rad] and per second. No motor gets more than the limit, and
+    ``position``, ``rate`` and ``disturbance`` (5,) [m, rad] and by s and s². No motor gets more than the limit, and
     what carries comes first.
     """
     landing: LandingArrays = block[0]
@@ -77,12 +85,13 @@ def land(block: Block, position: FloatArray, rate: FloatArray) -> bool:
             target = landing.aim + left
         wanted[axis] = (
             acceleration
+            - disturbance[axis]
             + landing.damping[axis] * (velocity - rate[axis])
             + landing.stiffness[axis] * (target - position[axis])
         )
     exact_inverse(
         machine_from_array(landing.machine),
-        CurrentLimits(landing.current_limit, 1.0, LEAST_ATTRACTION),
+        CurrentLimits(landing.current_limit, 1.0, LEAST_ATTRACTION, landing.along_z),
         np.ones(5),
         position,
         wanted,
@@ -98,14 +107,13 @@ class Landing:
         landing, machine, fault = parameters.landing, parameters.machine, parameters.fault
         self._lower = np.maximum(np.array(machine.lower_limit), np.array(fault.lower))
         self._upper = np.minimum(np.array(machine.upper_limit), np.array(fault.upper))
+        self._parameters = landing
         self.arrays = LandingArrays(
             machine=machine_constants(machine),
             current_limit=landing.current,
+            along_z=0.5,
             stiffness=landing.stiffness,
             damping=landing.damping,
-            braking=landing.braking_time,
-            descent_start=landing.braking_time,
-            descent_time=landing.descent_time,
             settle_time=landing.settle_time,
             aim=machine.gap_max + landing.depth,
             period=parameters.sample_time,
@@ -121,9 +129,18 @@ class Landing:
         """i_q of motors 1..4 [A], shape (4,), likewise."""
         return self.arrays.quadrature
 
-    def begin(self, position: FloatArray, rate: FloatArray) -> None:
-        """Start where the platen is: (5,) [m, rad] and per second."""
-        way = self.arrays
+    def begin(self, position: FloatArray, rate: FloatArray, blind: Flags = SEEING) -> None:
+        """Start where the platen is: (5,) [m, rad] and per second; ``blind`` (5,): seen by nothing.
+
+        Where the model alone tells of an axis it is over sooner. A motor whose displacement is not
+        known pushes along it unless its i_d is small or negative, and the magnets undo the springs
+        of a tilt that is not known the less its motors pull: that decides which pair carries.
+        """
+        way, landing = self.arrays, self._parameters
+        hurried = bool(np.any(blind))
+        way.descent_start = landing.blind_braking_time if hurried else landing.braking_time
+        way.descent_time = landing.blind_descent_time if hurried else landing.descent_time
+        way.along_z = 0.5 + 0.5 * float(np.clip(_CARRY @ blind, -1.0, 1.0))
         way.braking[:] = braking_times(position, rate, self._lower, self._upper, way.descent_start)
         if rate[0] < 0.0:  # towards the motors, where a tilt still takes room
             way.braking[0] = min(way.braking[0], _BRAKING_UPWARD)
@@ -133,9 +150,9 @@ class Landing:
         way.speed[:] = rate
         way.elapsed = 0.0
 
-    def step(self, position: FloatArray, rate: FloatArray) -> bool:
+    def step(self, position: FloatArray, rate: FloatArray, disturbance: FloatArray) -> bool:
         """Compute the currents of the next sample; true when the landing is over."""
-        return land(self.arrays.block, position, rate)
+        return land(self.arrays.block, position, rate, disturbance)
 
 
 @compiled

@@ -137,7 +137,7 @@ class StageLife(abc.ABC):
             if self.realtime:
                 time.sleep(self.sample_time)
         shift = self.encoders.home(readings)
-        self.guard.forget()
+        self.guard.trust()
         if lifted:
             self._prove_lower_stop(self.parameters.homing.lift)
         return shift

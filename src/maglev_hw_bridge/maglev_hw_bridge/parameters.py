@@ -41,9 +41,15 @@ class FaultParameters:
         unit='A',
         within=(0.1, 200.0),
     )
+    bandwidth: float = parameter(
+        200.0,
+        'of the observer that foretells what the encoders read',
+        unit='rad/s',
+        within=(10.0, 1000.0),
+    )
     jump: float = parameter(
-        3e-4,
-        'largest change of an encoder from one sample to what the two before foretell',
+        6e-5,
+        'largest change of an encoder in a sample from what is foretold; more is a slip',
         unit='m',
         within=(1e-6, 0.1),
     )
@@ -54,22 +60,25 @@ class FaultParameters:
         within=(1e-6, 0.1),
     )
     stuck_gap: float = parameter(
-        1e-4,
-        'a gap encoder is stuck when the other three see it move this far meanwhile',
+        2e-4,
+        'a gap encoder is stuck when it should have moved this far without a count, or when '
+        'meanwhile the four have come to contradict each other by half of it',
         unit='m',
         within=(1e-6, 0.1),
     )
     stuck_horizontal: float = parameter(
-        3e-4,
-        'x or z is stuck when the force should have moved it this far meanwhile',
+        1.5e-4,
+        'x or z is stuck when it should have moved this far without a count',
         unit='m',
         within=(1e-6, 0.1),
     )
-    friction: float = parameter(
-        0.5,
-        'deceleration that guide friction along X and Z stays below',
-        unit='m/s^2',
-        within=(0.0, 100.0),
+    friction: tuple[float, ...] = parameter(
+        (0.8, 0.35, 0.35, 3.0, 3.0),
+        'by how much the force on a platen that stands still may differ from the model, friction '
+        'and all' + _BY_AXIS,
+        unit='m/s^2, rad/s^2',
+        within=(0.0, 1000.0),
+        length=5,
     )
     lower: tuple[float, ...] = parameter(
         (0.0183, -0.048, -0.048, -0.0028, -0.0135),
@@ -113,6 +122,12 @@ class BridgeLandingParameters:
     )
     descent_time: float = parameter(
         1.0, 'time to descend to the lower stop', unit='s', within=(0.1, 60.0)
+    )
+    blind_braking_time: float = parameter(
+        0.06, 'the first where an axis is seen by no encoder', unit='s', within=(0.05, 10.0)
+    )
+    blind_descent_time: float = parameter(
+        0.28, 'the second where an axis is seen by no encoder', unit='s', within=(0.1, 60.0)
     )
     settle_time: float = parameter(
         0.2, 'time pressed on the stop before the end', unit='s', within=(0.0, 10.0)

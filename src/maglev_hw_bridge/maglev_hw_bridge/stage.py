@@ -61,9 +61,10 @@ class BridgeStage(StageLife):
     def _warm_up(self) -> None:
         """Compile, or load what was compiled, before a sample asks for it."""
         y, rate = self._lower_stop, np.zeros(5)
-        self.guard.watch(np.array([y, y, y, y, 0.0, 0.0]), True)
+        for _ in range(3):
+            self.guard.watch(np.array([y, y, y, y, 0.0, 0.0]), self.amplifiers.arrays.current, True)
         self.landing.begin(self.guard.arrays.position, rate)
-        self.landing.step(self.guard.arrays.position, rate)
+        self.landing.step(self.guard.arrays.position, rate, rate)
         self.encoders.decode(self._counts)
         self.amplifiers.drive(self._zero, self._zero, 0.0, 0.0)
         faults.consequence_of_cut(self.parameters, self.guard)
@@ -93,7 +94,7 @@ class BridgeStage(StageLife):
         except DriverError as error:
             raise self._lose_boards(error) from error
         length = self.encoders.decode(self._counts)
-        code, index = self.guard.watch(length, self.flying)
+        code, index = self.guard.watch(length, self.amplifiers.arrays.current, self.flying)
         if code != guard.FINE:
             self._sensing_fault(code, index)
         if self.driver.stop_pressed:
@@ -140,7 +141,6 @@ class BridgeStage(StageLife):
         code, index = self.amplifiers.drive(i_d, i_q, x, z)
         if code in (amplifiers.FINE, amplifiers.SPENT):
             self._direct[:], self._quadrature[:] = i_d, i_q
-            self.guard.arrays.i_q[:] = i_q
             self.flying = flows
         if code == amplifiers.FINE:
             return ''
@@ -169,13 +169,12 @@ class BridgeStage(StageLife):
         self._landing_samples += 1
         stopping = self.fault is not None and self.fault.kind == 'stop'
         too_long = stopping and self._landing_samples > self._longest_stop
-        if self.landing.step(state.position, state.rate) or too_long:
+        if self.landing.step(state.position, state.rate, state.disturbance) or too_long:
             self._disable()
             return
         x, z = state.believed[4], state.believed[5]
         i_d, i_q = self.landing.direct_current, self.landing.quadrature_current
         code, _ = self.amplifiers.drive(i_d, i_q, x, z)
-        state.i_q[:] = i_q
         if code not in (amplifiers.FINE, amplifiers.SPENT):
             self._disable()
 
@@ -210,7 +209,7 @@ class BridgeStage(StageLife):
             self._disable()
             return
         self.mode, self._landing_samples = Mode.LANDING, 0
-        self.landing.begin(state.position, state.rate)
+        self.landing.begin(state.position, state.rate, self.guard.blind)
 
     def _sensing_fault(self, code: int, index: int) -> None:
         if code in (guard.RANGE, guard.GAP_RANGE):
@@ -218,10 +217,11 @@ class BridgeStage(StageLife):
                 return
             self._raise_fault('range', *faults.range_fault(code, index, self.guard))
         else:
-            unsound = not self.guard.mended
-            self._raise_fault(
-                'encoder', *faults.encoder_fault(code, index, self.guard), cut=unsound
-            )
+            reason, remedy = faults.encoder_fault(code, self.guard)
+            blind = self.guard.blind
+            self._raise_fault('encoder', reason, remedy, cut=bool(blind[0]))
+            if self.mode is Mode.LANDING and code != guard.RESIDUAL and blind.any():
+                self._begin_landing()
 
     def _late(self) -> None:
         self.late_ticks += 1

@@ -45,6 +45,7 @@ class CurrentLimits(NamedTuple):
     current: float  # phase-current amplitude of a motor, sat_7 of (17) [A]
     levitation_first: float  # 1: i_q yields to the i_d that carries the platen; 0: each by itself
     least_attraction: float  # share of the weight always carried, so that the tilts keep authority
+    along_z: float = 0.5  # share of the attraction that motors 1 and 3 have where nothing else asks
 
 
 class Answer(NamedTuple):
@@ -274,7 +275,7 @@ def _allocate(
     theta = controlled[4] * inertia * (wanted[4] + machine.k_s_theta * output[4])
     saturated = saturated or abs(phi) > 0.5 * total or abs(theta) > 0.5 * total
     phi, theta = clip(phi, 0.5 * total), clip(theta, 0.5 * total)
-    along_z = 0.5 * total
+    along_z = limits.along_z * total
     if limits.levitation_first != 0.0:
         bound = limits.current
         need_z = _pair_need(clip(u_z, bound), b[0], b[2], phi, 0.25 * least)

@@ -16,7 +16,7 @@ Block = NDArray[np.void]
 
 
 class Record:
-    """The fields that a subclass annotates: numbers, arrays, and other records.
+    """The fields that a subclass and its bases annotate: numbers, arrays, and other records.
 
     A number is ``float``, ``int`` or ``bool``; ``Annotated[NDArray[np.float64], 2, 6]`` is an array
     of shape (2, 6); a record within a record shares its memory. :attr:`block`, shape (1,),
@@ -28,7 +28,9 @@ class Record:
     _records: ClassVar[dict[str, type[Record]]]
 
     def __init_subclass__(cls) -> None:
-        fields = inspect.get_annotations(cls, eval_str=True)
+        fields: dict[str, Any] = {}
+        for base in reversed(cls.__mro__[: cls.__mro__.index(Record)]):
+            fields |= inspect.get_annotations(base, eval_str=True)
         cls.dtype = np.dtype([(name, *_element(hint)) for name, hint in fields.items()], align=True)
         cls._records = {name: hint for name, hint in fields.items() if _is_record(hint)}
         for name in fields:

@@ -1,0 +1,101 @@
+"""Many runs over several processes, with progress, until they are done or it is interrupted."""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from itertools import groupby
+from multiprocessing.synchronize import Event
+from typing import NamedTuple, TypeVar
+
+from maglev_study.faults.flight import Flight
+from maglev_study.faults.fly import Scenario
+from maglev_study.faults.judge import Verdict
+from maglev_study.faults.machines import NOMINAL, machine
+from maglev_study.faults.programme import programme
+from maglev_study.faults.shrink import shrink
+from maglev_study.faults.train import fly_all
+
+_stop: Event | None = None
+
+T = TypeVar('T')
+
+
+class Outcome(NamedTuple):
+    """A run and its verdict."""
+
+    run: Scenario
+    verdict: Verdict
+
+
+class Campaign:
+    """Processes that fly runs; to be used in a ``with`` statement.
+
+    Ctrl-C ends what is under way after the run that it is at; what was done so far is kept.
+    """
+
+    def __init__(self, jobs: int) -> None:
+        self._jobs = jobs
+        self.interrupted = False
+
+    def __enter__(self) -> Campaign:
+        context = multiprocessing.get_context('fork')
+        self._stop = context.Event()
+        Flight(machine(NOMINAL), programme(NOMINAL))  # compiled once, before there are processes
+        self._pool = ProcessPoolExecutor(self._jobs, context, _begin, (self._stop,))
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop.set()
+        self._pool.shutdown(cancel_futures=True)
+
+    def fly(self, runs: Sequence[Scenario], heard: Callable[[list[Outcome]], None]) -> None:
+        """Fly runs, handing over outcomes as they come.
+
+        Raises RuntimeError when a machine does not fly even without a fault.
+        """
+        by_machine = [list(group) for _, group in groupby(runs, key=lambda run: run.machine)]
+        self._do([self._pool.submit(_fly, part) for part in by_machine], heard)
+
+    def shrink(
+        self, failures: Sequence[Outcome], heard: Callable[[tuple[Outcome, Outcome]], None]
+    ) -> None:
+        """Make failures as small as they still fail, handing over each with what it became."""
+        self._do([self._pool.submit(_shrink, failure) for failure in failures], heard)
+
+    def _do(self, futures: list[Future[T]], heard: Callable[[T], None]) -> None:
+        if self.interrupted:
+            return
+        told: set[Future[T]] = set()
+        try:
+            for future in as_completed(futures):
+                heard(future.result())
+                told.add(future)
+        except KeyboardInterrupt:
+            self.interrupted = True
+            self._stop.set()
+            self._pool.shutdown(cancel_futures=True)
+            for future in futures:
+                if future not in told and not future.cancelled():
+                    heard(future.result())
+
+
+def _begin(stop: Event) -> None:
+    """A worker leaves Ctrl-C to whoever started it."""
+    global _stop
+    _stop = stop
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _stopped() -> bool:
+    return _stop is not None and _stop.is_set()
+
+
+def _fly(runs: Sequence[Scenario]) -> list[Outcome]:
+    return [Outcome(run, verdict) for run, verdict in fly_all(runs, _stopped)]
+
+
+def _shrink(failure: Outcome) -> tuple[Outcome, Outcome]:
+    return failure, Outcome(*shrink(failure.run, failure.verdict, _stopped))

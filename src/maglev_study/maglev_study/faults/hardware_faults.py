@@ -1,0 +1,160 @@
+"""What encoders, boards and amplifiers do wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from maglev_hw_bridge.emulated_card import HILError
+from maglev_hw_bridge.signal_parameters import ENCODER_NAMES
+from maglev_study.faults.kinds import CUT, DEGRADED, NOMINAL, Expected, Fault, Kind, Run
+from maglev_study.faults.programme import PHASES
+
+FOR_EVER = 10**9
+INTERRUPTED = -35
+"""What the vendor calls QERR_INTERRUPTED: a signal came during a blocking call."""
+
+# -- encoders --------------------------------------------------------------------------------------
+
+SHOWS = np.array([30, 30, 30, 30, 40, 40])
+"""Counts an encoder is off the truth from which on it must be found out."""
+
+_DISPENSABLE = 2
+"""Gap encoders that the model can stand in for."""
+
+SIZES = {'stuck': (0, 0), 'slip': (1, 50), 'jump': (51, 5000), 'noise': (5, 100), 'reset': (0, 0)}
+WHICH = {'a gap': 'gap', 'x or z': 'across', 'several': 'several'}
+
+
+def encoders(name: str, which: str) -> Kind:
+    def draw(rng: np.random.Generator) -> Fault:
+        if which == 'gap':
+            targets = [int(rng.integers(4))]
+        elif which == 'across':
+            targets = [int(rng.integers(4, 6))]
+        else:
+            bits = int(rng.choice([b for b in range(64) if bin(b).count('1') > 1]))
+            targets = [i for i in range(6) if bits >> i & 1]
+        low, high = SIZES[name]
+        size = float(rng.integers(low, high + 1) * (rng.choice((-1, 1)) if low else 1))
+        return Fault(_row(name, which), tuple(targets), size)
+
+    def begin(run: Run, fault: Fault) -> None:
+        world, targets = run.flight.world, list(fault.targets)
+        if name == 'stuck':
+            world.stuck[targets] = True
+        elif name == 'noise':
+            world.noise[targets] = abs(int(fault.size))
+        elif name == 'reset':
+            world.jumps[targets] -= world.rig.counts()[targets] + world.jumps[targets]
+        else:
+            signs = run.rng.choice((-1, 1), len(targets)) if len(targets) > 1 else 1
+            world.jumps[targets] += int(fault.size) * signs
+
+    def expected(fault: Fault) -> Expected:
+        gaps = sum(target < 4 for target in fault.targets)
+        lasting = name in ('stuck', 'noise')
+        hopeless = lasting and gaps > _DISPENSABLE
+        one = f'(?:{"|".join(ENCODER_NAMES[target] for target in fault.targets)})'
+        blame = f'encoder {one}(?:, {one})* (?:jumped|is stuck)|contradict'
+        return Expected(CUT if hopeless else DEGRADED, 10, blame)
+
+    lost_unseen = name in ('slip', 'jump', 'reset') and which != 'gap'
+    phases = tuple(phase for phase in PHASES if not (lost_unseen and phase == 'arming'))
+    return Kind(_row(name, which), draw, begin, expected, phases)
+
+
+def _row(name: str, which: str) -> str:
+    return f'{name}: {next(text for text, short in WHICH.items() if short == which)}'
+
+
+# -- the vendor's calls ----------------------------------------------------------------------------
+
+_FIRST_BOARD_ONLY = (
+    'set_digital_directions',
+    'read_digital',
+    'write_digital',
+    'task_create_encoder_reader',
+    'task_start',
+    'task_read_encoder',
+    'task_stop',
+    'task_delete',
+)
+WRONG: dict[str, Callable[[Callable[..., Any], tuple[Any, ...]], Any]] = {
+    'task_read_encoder': lambda sound, arguments: 0,
+    'read_encoder': lambda sound, arguments: None,
+    'watchdog_reload': lambda sound, arguments: False,
+    'watchdog_is_expired': lambda sound, arguments: True,
+    'write_analog': lambda sound, arguments: None,
+    'write_digital': lambda sound, arguments: None,
+}
+"""Calls that come back without an error, and have not done what they should."""
+
+
+def calls(mode: str, names: Sequence[str], lasts: bool) -> Kind:
+    def draw(rng: np.random.Generator) -> Fault:
+        name = str(rng.choice(names))
+        board = 0 if name in _FIRST_BOARD_ONLY else int(rng.integers(2))
+        size = float(rng.integers(2, 101)) if mode == 'hang' else 0.0
+        return Fault(f'call: {mode}', (board,), size, name)
+
+    def begin(run: Run, fault: Fault) -> None:
+        flight, left = run.flight, FOR_EVER if lasts else 1
+
+        def behave(sound: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+            nonlocal left
+            if left <= 0:
+                return sound(*arguments)
+            left -= 1
+            if flight.samples not in run.shows[-1:]:
+                run.shows.append(flight.samples)
+            if mode == 'wrong result':
+                return WRONG[fault.call](sound, arguments)
+            if mode == 'hang':
+                flight.world.let_pass(int(fault.size))
+                return sound(*arguments)
+            raise _error(mode)
+
+        flight.world.fail(fault.call, fault.targets[0], behave)
+
+    def expected(fault: Fault) -> Expected:
+        if mode == 'interrupted':
+            return Expected(NOMINAL, None, '')
+        if mode == 'hang':
+            return Expected(NOMINAL if fault.size < 18 else CUT, None, '')
+        telling = fault.call in ('task_read_encoder', 'write_analog', 'watchdog_reload')
+        if mode == 'wrong result':
+            telling = fault.call == 'task_read_encoder'
+        return Expected(CUT, 3 if telling else None, '', aloft=True)
+
+    return Kind(f'call: {mode}', draw, begin, expected, weight=4)
+
+
+def _error(mode: str) -> Exception:
+    if mode == 'foreign exception':
+        return RuntimeError('injected: none of the vendor')
+    if mode == 'interrupted':
+        return HILError(INTERRUPTED, 'the operation was interrupted by a signal')
+    return HILError(-8, 'injected: the board does not answer')
+
+
+# -- amplifiers ------------------------------------------------------------------------------------
+
+
+def amplifier(name: str) -> Kind:
+    def draw(rng: np.random.Generator) -> Fault:
+        size = float(rng.choice((-1.0, 1.0)) * rng.uniform(0.05, 0.3))
+        if name == 'stuck on':
+            size = float(rng.uniform(-5.0, 5.0))
+        return Fault(f'phase: {name}', (int(rng.integers(12)),), size)
+
+    def begin(run: Run, fault: Fault) -> None:
+        world, (phase,) = run.flight.world, fault.targets
+        if name == 'stuck on':
+            world.stick_on(phase, fault.size)
+        else:
+            world.scale_gain(phase, 0.0 if name == 'dead' else 1.0 + fault.size)
+
+    return Kind(f'phase: {name}', draw, begin, lambda fault: Expected(DEGRADED, None, ''))

@@ -1,0 +1,269 @@
+"""Judges a run by what truly happened: outputs, lines, watchdogs, and the platen's true state.
+
+Nothing that the bridge believes is looked at, but for the time and the words of its fault.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+import numpy as np
+
+from maglev_hw_bridge.rig import Rig
+from maglev_model.axes import FloatArray
+from maglev_study.faults.flight import Flight
+from maglev_study.faults.hardware_faults import SHOWS
+from maglev_study.faults.kinds import CUT, DEGRADED, Expected
+from maglev_study.faults.programme import PERIOD
+
+RULES = {
+    1: 'found out in time, or unobservable and bounded',
+    2: 'landed softly, or no faster than foretold',
+    3: 'outputs and amplifiers off within 25 ms of the end',
+    4: 'no output from a fault to reset and zero command; no enable where it is forbidden',
+    5: 'the component blamed is the one that failed',
+    6: 'no hang, no leak, and a restart works',
+}
+
+QUIET_AFTER = 25  # samples from a terminal state to when there is no output
+_QUIET = 1e-6  # [V]
+_FLYING = 1e-4  # above the lower stop [m]
+_OFF_COURSE = (1.5e-3, 3e-3, 3e-3)  # of y, x, z while nothing is found out [m]
+_FALL = 600  # longest, without current [samples]
+_CUT_SAMPLES = 3
+_FORETOLD = re.compile(r'strikes the \w+ stop at about ([\d.]+) m/s')
+_LONGEST = 16_000
+
+
+class Verdict(NamedTuple):
+    """What came of a run."""
+
+    violations: tuple[tuple[int, str], ...]  # rule, and what happened
+    impact: float  # greatest speed at a stop [m/s]
+    detection: float | None  # from when it showed to when it was latched [s]
+    ended: str  # landed, cut, on the ground
+    reason: str  # of the fault, as the bridge says it
+
+
+class Judge:
+    """Watches a flight from its creation on."""
+
+    def __init__(self, flight: Flight) -> None:
+        self.flight = flight
+        world = flight.world
+        self.prior = flight.bridge.stage.fault
+        self.seen: int | None = None  # tick of the new fault, or of a refusal
+        self.latched = 0  # ticks until which the prior fault stayed latched
+        self.reason = ''
+        self.cut_by_itself = False
+        self.ended: int | None = None  # tick of the terminal state
+        self.released: int | None = None  # tick of the end of the process
+        self.problems: list[tuple[int, str]] = []
+        self.baseline = world.deviation.copy()
+        self.may_enable = False  # a reset has gone well, or the process was started again
+        self.enable_counts = True  # the enable line does what the bridge tells it,
+        self.output_counts = True  # and so do the outputs
+        self._state = np.zeros((_LONGEST, 10))
+        self._volts = np.zeros((_LONGEST, 16))
+        self._shift = np.zeros((_LONGEST, 6), dtype=np.int64)
+        self._course = np.full((_LONGEST, 3), np.nan)
+        self._enabled = np.zeros(_LONGEST, dtype=bool)
+        self._phase_channels = world._outputs[0] * 8 + world._outputs[1]
+        self._n = 0
+        world.rig.forget_impact()
+        world.observe = self._observe
+        self._enabled_before = world.enabled
+
+    # -- while it flies ----------------------------------------------------------------------------
+
+    def _observe(self) -> None:
+        world, n = self.flight.world, self._n
+        if n >= _LONGEST:
+            raise RuntimeError('the run does not end')
+        self._state[n] = world.rig.stage.state
+        self._volts[n] = world.volts.ravel()
+        self._shift[n] = world.deviation
+        enabled = world.enabled
+        self._enabled[n] = enabled and not self.may_enable and self.enable_counts
+        if enabled and not self._enabled_before and self.flight.forbidden:
+            self.blame(4, f'amplifiers enabled {self.flight.forbidden}')
+        self._enabled_before = enabled
+        self._n = n + 1
+
+    def after_step(self) -> None:
+        """Look at the fault, once a sample."""
+        fault = self.flight.bridge.stage.fault
+        if self.prior is not None and fault is self.prior:
+            self.latched = self._n
+        if self.seen is None and fault is not None and fault is not self.prior:
+            self.notice(fault.reason)
+            self.cut_by_itself = fault.cut
+
+    def on_course(self, wanted: FloatArray) -> None:
+        """The platen should be near ``wanted`` (5,) [m, rad], once it has left the stop."""
+        if self._aloft(self._n - 1):
+            self._course[self._n - 1] = wanted[:3]
+
+    def notice(self, reason: str) -> None:
+        """The bridge has found something out."""
+        if self.seen is None:
+            self.seen, self.reason = self._n, reason
+
+    def end(self) -> None:
+        """A terminal state is reached."""
+        if self.ended is None:
+            self.ended = self._n
+
+    def release(self) -> None:
+        """The process ends."""
+        if self.released is None:
+            self.released = self._n
+
+    def blame(self, rule: int, text: str) -> None:
+        """A rule is broken."""
+        if (rule, text) not in self.problems:
+            self.problems.append((rule, text))
+
+    @property
+    def shift(self) -> int:
+        """Index of the next sample that is logged."""
+        return self._n
+
+    def log(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """True states (n, 10), outputs (n, 16) [V], counts off the truth (n, 6), enable (n,)."""
+        n = self._n
+        shift, enabled = self._shift[:n] - self.baseline, self._enabled[:n]
+        return self._state[:n], self._volts[:n], shift.astype(np.float64), enabled.astype(float)
+
+    def marks(self, shows: list[int]) -> dict[str, int]:
+        """What happened at which sample of the log."""
+        marks = {
+            'shows': self._first_sign(shows),
+            'found': self.seen,
+            'over': self.ended,
+            'process ended': self.released,
+        }
+        return {name: at for name, at in marks.items() if at is not None}
+
+    # -- afterwards --------------------------------------------------------------------------------
+
+    def judge(self, expected: Expected, shows: list[int]) -> Verdict:
+        """The verdict; ``shows`` are samples of the log at which something could be seen."""
+        n = self._n
+        first = self._first_sign(shows)
+        impact = max(self.flight.world.rig.impact, self._across())
+        self._judge_detection(expected, first)
+        self._judge_impact(expected, impact, first)
+        self._judge_outputs()
+        if self.reason and expected.blame and not re.search(expected.blame, self.reason):
+            self.blame(5, f'blamed: {self.reason}')
+        detection = None
+        if self.seen is not None and first is not None:
+            detection = PERIOD * max(self.seen - first, 0)
+        flew = bool(np.any(self._state[:n, 0] < self._floor - _FLYING))
+        ended = ('cut' if self._was_cut() else 'landed') if flew else 'on the ground'
+        return Verdict(tuple(self.problems), impact, detection, ended, self.reason)
+
+    def _aloft(self, index: int) -> bool:
+        return bool(self._state[min(index, self._n - 1), 0] < self._floor - _FLYING)
+
+    @property
+    def _floor(self) -> float:
+        return self.flight.parameters.machine.gap_max
+
+    def _first_sign(self, shows: list[int]) -> int | None:
+        wrong = np.any(np.abs(self._shift[: self._n] - self.baseline) > SHOWS, axis=1)
+        signs = [int(np.argmax(wrong))] if wrong.any() else []
+        return min([*shows, *signs], default=None)
+
+    def _judge_detection(self, expected: Expected, first: int | None) -> None:
+        if first is not None:
+            first = max(first, self.latched)
+        until = self._n if self.ended is None else self.ended
+        seen = self.seen if self.seen is not None else until
+        wanted = first is not None and expected.seen is not None
+        if wanted and expected.aloft and not self._aloft(first or 0):
+            wanted = False
+        late = wanted and seen > (first or 0) + (expected.seen or 0)
+        if late and first is not None:
+            what = 'never found out' if self.seen is None else 'found out late'
+            self.blame(1, f'{what}: {seen - first} samples after it showed')
+        error = np.abs(self._state[:seen, :5:2] - self._course[:seen])
+        with np.errstate(invalid='ignore'):
+            astray = np.any(error > _OFF_COURSE, axis=1)
+        if astray.any() and not late:
+            at = int(np.argmax(astray))
+            if self.seen is None or self.seen > at + QUIET_AFTER:
+                worst = 1e3 * np.nanmax(error[: seen + 1], axis=0)
+                self.blame(1, f'unseen, and off course by {np.round(worst, 1)} mm in y, x, z')
+
+    def _judge_impact(self, expected: Expected, impact: float, first: int | None) -> None:
+        if expected.impact is not CUT:
+            if impact > expected.impact:
+                self.blame(2, f'struck a stop at {impact:.3f} m/s, at most {expected.impact:g}')
+            return
+        told = _FORETOLD.search(self.reason)
+        if told:
+            foretold = float(told.group(1))
+        else:
+            at = min(self.seen if self.seen is not None else (first or 0), self._n - 1)
+            foretold = self._fall_from(max(at - 1, 0))
+        most = max(DEGRADED, 1.15 * foretold + 0.03)
+        if impact > most:
+            self.blame(2, f'struck a stop at {impact:.3f} m/s, a cut was to give {foretold:.2f}')
+
+    def _judge_outputs(self) -> None:
+        if self.ended is None:
+            return
+        after = slice(self.ended + QUIET_AFTER, self._n)
+        error = self._output_error(after)
+        if self.output_counts and error.size and error.max() > _QUIET:
+            self.blame(3, f'output {error.max():.2f} V off no current after the end')
+        released = self._n if self.released is None else self.released
+        if self._enabled[after.start : released].any():
+            self.blame(3, 'amplifiers enabled while a fault is latched')
+        if self._enabled[max(released + QUIET_AFTER, after.start) : self._n].any():
+            self.blame(3, 'amplifiers enabled after the process has ended')
+
+    def _output_error(self, where: slice) -> FloatArray:
+        """How far the outputs of the phases are off no current [V], by sample; 0 V is allowed."""
+        volts = self._volts[where][:, self._phase_channels]
+        rest = np.array(self.flight.parameters.emulation.wiring.offset)
+        error: FloatArray = np.minimum(np.abs(volts), np.abs(volts - rest))
+        return error.max(axis=1) if len(error) else np.zeros(0)
+
+    def _was_cut(self) -> bool:
+        """Whether there was no output in flight for some samples."""
+        n = self._n
+        quiet = self._output_error(slice(0, n)) < _QUIET
+        aloft = self._state[:n, 0] < self._floor - _FLYING
+        run = np.convolve(quiet & aloft, np.ones(_CUT_SAMPLES), 'valid')
+        return bool(np.any(run >= _CUT_SAMPLES))
+
+    def _across(self) -> float:
+        """Greatest speed at which the platen met a stop along X or Z [m/s]."""
+        machine, state = self.flight.parameters.machine, self._state[: self._n]
+        worst = 0.0
+        for axis, stop in ((1, machine.x_max), (2, machine.z_max)):
+            there = np.abs(state[:, 2 * axis]) >= stop - 1e-9
+            met = np.flatnonzero(there[1:] & ~there[:-1])
+            if len(met):
+                worst = max(worst, float(np.max(np.abs(state[met, 2 * axis + 1]))))
+        return worst
+
+    def _fall_from(self, index: int) -> float:
+        """What a cut at a sample of the log would give [m/s], by the world's own physics."""
+        rig: Rig = self.flight.world.rig
+        saved = rig.arrays.block.copy(), rig.stage.block.copy()
+        rig.stage.state[:] = self._state[index]
+        rig.arrays.current[:] = 0.0
+        rig.forget_impact()
+        rest = np.array(self.flight.parameters.emulation.wiring.offset)
+        for _ in range(_FALL):
+            rig.advance(rest)
+            if rig.impact > 0.0:
+                break
+        speed = rig.impact
+        rig.arrays.block[:], rig.stage.block[:] = saved
+        return speed

@@ -1,0 +1,56 @@
+"""Machines that differ from what the bridge and the controller believe, drawn by number."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_model.guide import GuideParameters
+from maglev_model.parameters import build
+from maglev_plant.parameters import OffsetParameters
+
+STOP_INPUT = 0
+ENABLE_OUTPUT = 1
+NOMINAL = 0
+"""The number of the machine that is what it is believed to be."""
+
+_MODEL_ERROR = 0.1  # of every constant
+_FRICTION = (0.2, 2.0)  # of the default
+_MOST_OFFSET = 0.05  # of an amplifier, known to the bridge [V]
+_MOST_NOISE = 2e-6  # of an encoder, before it counts [m]
+
+_STREAM = 7919  # keeps these draws apart from all others that have the same number
+
+_COMMON: dict[str, object] = {
+    'homing.x': 0.0,
+    'homing.z': 0.0,
+    'boards.stop_input': STOP_INPUT,
+    'boards.enable_output': ENABLE_OUTPUT,
+}
+
+
+def machine(number: int) -> BridgeParameters:
+    """Parameters of the bridge, with those of the machine behind its boards, by number."""
+    if number == NOMINAL:
+        return build(BridgeParameters, _COMMON)
+    rng = np.random.default_rng([_STREAM, number])
+    wrong = {
+        f'emulation.offset.{name}': float(1.0 + rng.uniform(-_MODEL_ERROR, _MODEL_ERROR))
+        for name in OffsetParameters.__dataclass_fields__
+    }
+    coulomb = np.array(GuideParameters().coulomb) * rng.uniform(*_FRICTION, 5)
+    offset = rng.uniform(-_MOST_OFFSET, _MOST_OFFSET, 12).tolist()
+    return build(
+        BridgeParameters,
+        {
+            **_COMMON,
+            **wrong,
+            'emulation.seed': number,
+            'emulation.guide.coulomb': coulomb.tolist(),
+            'emulation.encoder.gap_noise': float(rng.uniform(0.0, _MOST_NOISE)),
+            'emulation.encoder.horizontal_noise': float(rng.uniform(0.0, _MOST_NOISE)),
+            'emulation.wiring.encoder_start': rng.integers(-(10**5), 10**5, 6).tolist(),
+            'emulation.wiring.offset': offset,
+            'amplifier.offset': offset,
+        },
+    )

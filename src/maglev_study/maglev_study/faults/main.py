@@ -1,0 +1,172 @@
+"""``faults``: faults of encoders, boards, amplifiers, controller and process, in every phase.
+
+Flies the real bridge on emulated boards, in lockstep and without ROS, against machines that differ
+from what is believed of them, and judges each run by what truly happened.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from maglev_study.faults.campaign import Campaign, Outcome
+from maglev_study.faults.draw import cells, from_json, scenario
+from maglev_study.faults.fly import Scenario
+from maglev_study.faults.judge import RULES
+from maglev_study.faults.page import describe, describe_violations, write
+from maglev_study.faults.tally import Tally
+
+PASS, BROKEN, WRONG_USE, INTERRUPTED = 0, 1, 2, 130
+
+_RUNS = 3000
+_SHRUNK = 12  # failures, of different kinds
+_MOST_RUNS = 10_000_000
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point of the executable; its exit code.
+
+    0: all rules hold; 1: some do not; 2: wrong use; 130: interrupted, the page tells what was done.
+    """
+    options = _parser().parse_args(arguments)
+    try:
+        out = _folder(options.out)
+        if options.replay is not None:
+            return _replay(_run_of(options.replay, options.double), out)
+    except ValueError as error:
+        print(f'faults: error: {error}', file=sys.stderr)
+        return WRONG_USE
+    number = len(cells()) if options.short else options.runs
+    runs = [
+        scenario(seed, double=options.double) for seed in range(options.seed, options.seed + number)
+    ]
+    return _fly(runs, options.jobs, out)
+
+
+def _fly(runs: Sequence[Scenario], jobs: int, out: Path) -> int:
+    started = time.monotonic()
+    outcomes: list[Outcome] = []
+    shrunk: list[tuple[Outcome, Outcome]] = []
+
+    def heard(new: list[Outcome]) -> None:
+        outcomes.extend(new)
+        spent = time.monotonic() - started
+        broken = sum(bool(one.verdict.violations) for one in outcomes)
+        left = spent / max(len(outcomes), 1) * (len(runs) - len(outcomes))
+        print(
+            f'faults: {len(outcomes)} of {len(runs)} runs, {broken} with a rule broken,'
+            f' {spent:.0f} s, about {left:.0f} s left',
+            flush=True,
+        )
+
+    def report() -> Path:
+        spent = time.monotonic() - started
+        words = [f'{len(outcomes)} of {len(runs)} runs', f'{spent:.0f} s', f'{jobs} processes']
+        words.append(f'seeds {runs[0].seed} to {runs[-1].seed}')
+        return write(out, tally, shrunk, words, len(outcomes) == len(runs))
+
+    with Campaign(jobs) as campaign:
+        campaign.fly(runs, heard)
+        tally = Tally(sorted(outcomes, key=lambda one: one.run.seed))
+        path = report()
+        examples = tally.examples()[:_SHRUNK]
+        if examples and not campaign.interrupted:
+            print(f'faults: making {len(examples)} failures smaller', flush=True)
+            campaign.shrink(examples, shrunk.append)
+            path = report()
+    _tell(tally, shrunk, path)
+    if campaign.interrupted:
+        print('faults: interrupted', file=sys.stderr)
+        return INTERRUPTED
+    return BROKEN if tally.failures else PASS
+
+
+def _tell(tally: Tally, shrunk: Sequence[tuple[Outcome, Outcome]], path: Path) -> None:
+    for kind in tally.kinds:
+        row = tally.row(kind)
+        mark = f'  {row.violations} BROKEN' if row.violations else ''
+        print(f'  {kind:28}{row.runs:6} runs  {row.impact:6.3f} m/s{mark}')
+    for rule, number in tally.by_rule().items():
+        print(f'rule {rule} ({RULES[rule]}): broken in {number} runs')
+    for before, after in shrunk:
+        print(f'seed {before.run.seed}: {describe(after.run)}: {describe_violations(after)}')
+    number, rarest = tally.rarest()
+    print(f'faults: {len(tally.outcomes)} runs, {len(tally.failures)} broke a rule;', end=' ')
+    print(f'the rarest cell ({rarest}) was flown {number} times')
+    print(f'page: {path}')
+
+
+def _replay(run: Scenario, out: Path) -> int:
+    from maglev_study.faults.replay import replay
+    from maglev_study.faults.replay import write as write_replay
+
+    record = replay(run)
+    path = out / f'run-{run.seed}.html'
+    write_replay(record, path)
+    verdict = record.verdict
+    print(describe(run))
+    for name, at in record.marks.items():
+        print(f'  {name}: {at} ms after the beginning')
+    print(f'  {verdict.ended}, {verdict.impact:.4f} m/s at a stop')
+    print(f'  the bridge: {verdict.reason or "no fault"}')
+    for rule, text in verdict.violations:
+        print(f'  broken: rule {rule}: {text}')
+    print(f'page: {path}')
+    return BROKEN if verdict.violations else PASS
+
+
+def _run_of(text: str, double: bool) -> Scenario:
+    """The run of a seed, or the first of a file. Raises ValueError for what is neither."""
+    if text.isdecimal():
+        return scenario(int(text), double=double)
+    try:
+        plain = json.loads(Path(text).read_text(encoding='utf-8'))
+        return from_json(plain[0] if isinstance(plain, list) else plain)
+    except OSError as error:
+        raise ValueError(
+            f"--replay is '{text}', neither a seed nor a file that is there"
+        ) from error
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        raise ValueError(f"--replay: '{text}' holds no run: {error!r}") from error
+
+
+def _folder(path: Path) -> Path:
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ValueError(f"cannot write to '{path}': {error.strerror}") from error
+    return path.resolve()
+
+
+def _number(low: int, high: int) -> type[int]:
+    def check(text: str) -> int:
+        if not text.isdecimal() or not low <= int(text) <= high:
+            raise argparse.ArgumentTypeError(f"'{text}' is no whole number from {low} to {high}")
+        return int(text)
+
+    return check  # type: ignore[return-value]
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog='faults', description=__doc__)
+    cores = os.cpu_count() or 1
+    add = parser.add_argument
+    add('--runs', type=_number(1, _MOST_RUNS), default=_RUNS, metavar='N', help='how many')
+    add(
+        '--seed', type=_number(0, 2**53), default=0, metavar='S', help='of the first; they count up'
+    )
+    add('--jobs', type=_number(1, 512), default=cores, metavar='J', help='processes')
+    add('--double', action='store_true', help='a second fault up to 0.5 s after the first')
+    add('--short', action='store_true', help='one run of each cell of fault and phase')
+    add('--replay', metavar='SEED|FILE', help='fly one run alone, and draw it')
+    add('--out', type=Path, default=Path('faults'), metavar='DIR', help='where the page is left')
+    return parser
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,190 @@
+"""What the controller's and the bridge's processes do wrong, and what their operators may do."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from maglev_model.controller_watch import Status
+from maglev_study.faults.flight import Answer, Bridge
+from maglev_study.faults.kinds import CUT, NOMINAL, NOTHING, Begin, Expected, Fault, Kind, Run
+from maglev_study.faults.programme import BEFORE_THE_FIRST_SAMPLE, PHASES
+
+SAMPLING = tuple(phase for phase in PHASES if phase not in BEFORE_THE_FIRST_SAMPLE)
+"""Phases in which samples are taken."""
+
+# -- the controller --------------------------------------------------------------------------------
+
+_BLAME_CURRENTS = r'currents|i_d|command|controller|carry|old|age'
+
+
+def controller(name: str, low: int, high: int, seen: int | None) -> Kind:
+    def draw(rng: np.random.Generator) -> Fault:
+        return Fault(f'controller: {name}', (), float(rng.integers(low, high + 1)))
+
+    def begin(run: Run, fault: Fault) -> None:
+        _CONTROLLERS[name](run, fault)
+        if name not in ('slow', 'stalled'):
+            run.shows.append(run.flight.samples + 1)
+
+    return Kind(
+        f'controller: {name}',
+        draw,
+        begin,
+        lambda fault: Expected(NOMINAL, seen, _BLAME_CURRENTS, aloft=True),
+        SAMPLING,
+    )
+
+
+def _die(run: Run, fault: Fault) -> None:
+    run.flight.controller.alive = False
+
+
+def _except(run: Run, fault: Fault) -> None:
+    run.flight.controller.defect()
+
+
+def _give_up(run: Run, fault: Fault) -> None:
+    run.flight.inbox = run.flight.controller.last_words()
+
+
+def _zeros(run: Run, fault: Fault) -> None:
+    run.flight.controller.twist = lambda answer: [
+        answer._replace(direct=np.zeros(4), quadrature=np.zeros(4))
+    ]
+
+
+def _nan(run: Run, fault: Fault) -> None:
+    def twist(answer: Answer) -> list[Answer]:
+        direct = answer.direct.copy()
+        direct[int(fault.size) % 4] = np.nan
+        return [answer._replace(direct=direct)]
+
+    run.flight.controller.twist = twist
+
+
+def _slow(run: Run, fault: Fault) -> None:
+    run.flight.controller.pace = 1.0 / (1.0 + fault.size / 100.0)
+
+
+def _stall(run: Run, fault: Fault) -> None:
+    controller, end = run.flight.controller, run.flight.samples + int(fault.size)
+    controller.stalled = True
+
+    def each() -> None:
+        if run.flight.samples >= end:
+            controller.stalled = False
+
+    run.flight.each = each
+
+
+def _replay(run: Run, fault: Fault) -> None:
+    """What was said up to a while ago is said over and over, with the numbers it had."""
+    heard: list[Answer] = []
+
+    def twist(answer: Answer) -> list[Answer]:
+        heard.append(answer)
+        return [heard[(len(heard) - 1) % int(fault.size)]]
+
+    run.flight.controller.twist = twist
+
+
+def _foreign(run: Run, fault: Fault) -> None:
+    """Somebody else publishes as well, with numbers and currents of its own."""
+    number = int(run.rng.integers(0, 2**31))
+    session = int(run.rng.integers(1, 2**31))
+    i_d, i_q = run.rng.uniform(-5.0, 5.0, 4), run.rng.uniform(-5.0, 5.0, 4)
+
+    def twist(answer: Answer) -> list[Answer]:
+        nonlocal number
+        number += 1
+        return [answer, Answer(number, i_d, i_q, Status.FLYING, session, False)]
+
+    run.flight.controller.twist = twist
+
+
+_CONTROLLERS: dict[str, Begin] = {
+    'killed': _die,
+    'exception': _except,
+    'gives up': _give_up,
+    'zeros': _zeros,
+    'NaN': _nan,
+    'slow': _slow,
+    'stalled': _stall,
+    'replayed': _replay,
+    'foreign': _foreign,
+}
+
+# -- the bridge's process, and its operator --------------------------------------------------------
+
+
+def operator(
+    name: str,
+    act: Begin,
+    impact: float | None = NOMINAL,
+    blame: str = NOTHING,
+    phases: tuple[str, ...] = PHASES,
+    sizes: tuple[int, int] = (0, 0),
+    seen: int | None = None,
+) -> Kind:
+    def begin(run: Run, fault: Fault) -> None:
+        if seen is not None:
+            run.shows.append(run.flight.samples + 1)
+        act(run, fault)
+
+    return Kind(
+        name,
+        lambda rng: Fault(name, (), float(rng.integers(sizes[0], sizes[1] + 1))),
+        begin,
+        lambda fault: Expected(impact, seen, blame),
+        phases,
+    )
+
+
+def stopped() -> Kind:
+    def begin(run: Run, fault: Fault) -> None:
+        run.flight.world.delay(int(fault.size))
+
+    def expected(fault: Fault) -> Expected:
+        return Expected(NOMINAL if fault.size < 18 else CUT, None, 'late|watchdog')
+
+    return Kind(
+        'bridge stopped',
+        lambda rng: Fault('bridge stopped', (), float(rng.integers(1, 51))),
+        begin,
+        expected,
+        SAMPLING,
+    )
+
+
+def press(run: Run, fault: Fault) -> None:
+    run.flight.world.stop_pressed = True
+    run.flight.forbidden = 'with the stop pressed'
+
+
+def skip_homing(run: Run, fault: Fault) -> None:
+    run.flight.skip_homing = True
+    run.flight.forbidden = 'without homing'
+
+
+def heat(run: Run, fault: Fault) -> None:
+    run.flight.bridge.stage.amplifiers.arrays.load[:] = 0.95
+    run.flight.forbidden = 'hot'
+
+
+def second(run: Run, fault: Fault) -> None:
+    if not run.flight.world.cards:
+        return  # the first has not opened them yet
+    other = Bridge(run.flight.parameters, run.flight.world)
+    if other.configure():
+        other.stray = 'a second bridge had the boards of the first'
+        run.flight.bridge.stray = other.stray
+    other.die()
+
+
+def leave(run: Run, fault: Fault) -> None:
+    """Deactivate and clean up, as the life cycle wants it."""
+    run.flight.bridge.deactivate()
+
+
+def void(_value: object) -> None:
+    """Nothing is made of it."""

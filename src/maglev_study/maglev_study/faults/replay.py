@@ -1,0 +1,105 @@
+"""One run again, alone, with all that was logged of it drawn."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from maglev_model.axes import FloatArray
+from maglev_study.faults.campaign import Outcome
+from maglev_study.faults.flight import Flight
+from maglev_study.faults.fly import Course, Scenario
+from maglev_study.faults.judge import Verdict
+from maglev_study.faults.page import describe, describe_violations
+from maglev_study.faults.train import fly_all
+
+_SHIFT = 1e-2  # mm a count
+
+
+class Record(NamedTuple):
+    """A run with its log; row k is k samples after the instant at which the run begins."""
+
+    run: Scenario
+    verdict: Verdict
+    state: FloatArray  # true x1..x10 (n, 10)
+    volts: FloatArray  # outputs of both boards (n, 16)
+    shift: FloatArray  # counts of the encoders off the truth (n, 6)
+    enabled: FloatArray  # whether the amplifiers are (n,)
+    marks: dict[str, int]  # what happened at which sample
+
+
+def replay(run: Scenario) -> Record:
+    """Fly one run and keep its log."""
+    ((_, outcome),) = fly_all([run], work=_record)
+    if isinstance(outcome, Verdict):  # it hung, or died
+        nothing = np.zeros((1, 16))
+        return Record(run, outcome, nothing, nothing, nothing, nothing, {})
+    return outcome
+
+
+def _record(flight: Flight, run: Scenario) -> Record:
+    course = Course(flight, run)
+    verdict = course.fly()
+    return Record(run, verdict, *course.judge.log(), course.judge.marks(course.shows))
+
+
+def draw(record: Record) -> str:
+    """The run as an HTML page."""
+    from maglev_monitor.report.page import bullets, header, page, picture
+
+    verdict = record.verdict
+    facts = [
+        f'{verdict.ended}, {verdict.impact:.4f} m/s at a stop',
+        f'as the bridge says: {verdict.reason or "nothing"}',
+    ]
+    facts += [f'{name} {at} ms after the beginning' for name, at in record.marks.items()]
+    title = f'Run {record.run.seed}'
+    broken = describe_violations(Outcome(record.run, verdict))
+    parts = [
+        header(title, 'fail' if broken else 'pass', [describe(record.run)]),
+        bullets('What happened', facts),
+        bullets('Broken', [broken] if broken else []),
+        picture(_plot(record)),
+    ]
+    return page(title, parts)
+
+
+def write(record: Record, path: Path) -> None:
+    """Write the page. Raises OSError when that cannot be."""
+    from maglev_monitor.report.page import write_page
+
+    write_page(path, draw(record))
+
+
+def _plot(record: Record):  # type: ignore[no-untyped-def]
+    from matplotlib import pyplot as plt
+
+    from maglev_monitor.report.drawing import STYLE, to_plot
+
+    time = np.arange(len(record.state), dtype=float)
+    with plt.rc_context(STYLE):
+        figure, panels = plt.subplots(5, 1, figsize=(9.0, 11.0), sharex=True)
+        state, rows = 1e3 * record.state, panels
+        rows[0].plot(time, state[:, 0])
+        rows[0].set(title='true air gap y', ylabel='mm')
+        rows[1].plot(time, state[:, 2:5:2], label=('x', 'z'))
+        rows[1].set(title='true displacements', ylabel='mm')
+        rows[2].plot(time, _SHIFT * np.clip(record.shift, -500, 500), label=_ENCODERS)
+        rows[2].set(title='what the encoders count off the truth, to 5 mm', ylabel='mm')
+        rows[3].plot(time, record.volts)
+        rows[3].set(title='outputs of both boards', ylabel='V')
+        rows[4].plot(time, record.enabled)
+        rows[4].set(title='amplifiers enabled', xlabel='ms after the beginning')
+        for panel in rows:
+            for name, at in record.marks.items():
+                panel.axvline(at, color=_MARKS.get(name, '#888888'), linewidth=0.8)
+        rows[1].legend()
+        rows[2].legend(ncols=3)
+        caption = 'Lines: ' + ', '.join(f'{name} at {at} ms' for name, at in record.marks.items())
+        return to_plot('The run', caption, figure)
+
+
+_ENCODERS = ('gap 1', 'gap 2', 'gap 3', 'gap 4', 'x', 'z')
+_MARKS = {'shows': '#c2452d', 'found': '#1f5fa8', 'over': '#2a8a62', 'process ended': '#9a9a9a'}

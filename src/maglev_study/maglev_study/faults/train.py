@@ -1,0 +1,124 @@
+"""A machine flies its programme once; at the instant of each run a child process branches off.
+
+A child has everything as it stands, down to the last array, in a few milliseconds, and cannot hurt
+the others: it may hang, or die.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+import pickle
+import select
+import signal
+import time
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from typing import TypeVar
+
+from maglev_study.faults.flight import Flight
+from maglev_study.faults.fly import Scenario, fly
+from maglev_study.faults.judge import Verdict
+from maglev_study.faults.machines import machine
+from maglev_study.faults.programme import programme
+
+_PATIENCE = 60.0  # with a run [s]
+
+T = TypeVar('T')
+
+
+def fly_all(
+    runs: Sequence[Scenario],
+    stopped: Callable[[], bool] = lambda: False,
+    work: Callable[[Flight, Scenario], T] = fly,  # type: ignore[assignment]
+) -> Iterator[tuple[Scenario, T | Verdict]]:
+    """Fly runs of one machine in the order in which they branch off, each with its outcome."""
+    flight = Flight(machine(runs[0].machine), programme(runs[0].machine))
+    gc.collect()
+    gc.freeze()
+    places = sorted(((_place(flight, run), number) for number, run in enumerate(runs)))
+    for place, number in places:
+        if stopped():
+            return
+        _go(flight, place)
+        yield runs[number], _branch(partial(work, flight, runs[number]))
+
+
+def _place(flight: Flight, run: Scenario) -> int:
+    """The sample at which a run begins; negative before the first."""
+    if run.phase in ('homing', 'arming'):
+        return -2 if run.phase == 'homing' else -1
+    return flight.course.sample_of(run.phase, run.instant)
+
+
+def _go(flight: Flight, place: int) -> None:
+    """Fly on to a sample."""
+    bridge = flight.bridge
+    if place >= -1 and not bridge.homed:
+        _demand(bridge.configure() and bridge.home(vouched=True), flight)
+    if place >= 0 and not bridge.active:
+        _demand(bridge.activate(), flight)
+    while flight.samples < place:
+        flight.step()
+        _demand(bridge.active, flight)
+
+
+def _demand(well: bool, flight: Flight) -> None:
+    if not well:
+        bridge = flight.bridge
+        raise RuntimeError(f'sound, but sample {flight.samples}: {bridge.refused or bridge.stray}')
+
+
+def _branch(work: Callable[[], T]) -> T | Verdict:
+    """Do it in a child process; a child that hangs or dies breaks rule 6."""
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            os.close(reading)
+            gc.disable()
+            data = pickle.dumps(_attempt(work))
+            with os.fdopen(writing, 'wb') as pipe:
+                pipe.write(data)
+            code = 0
+        finally:
+            os._exit(code)
+    os.close(writing)
+    with os.fdopen(reading, 'rb') as pipe:
+        answer = _drain(pipe.fileno(), time.monotonic() + _PATIENCE)
+    if answer is None:
+        os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    if not answer:
+        return _broken('the run hangs' if answer is None else 'the run died')
+    outcome: T | Verdict = pickle.loads(answer)
+    return outcome
+
+
+def _attempt(work: Callable[[], T]) -> T | Verdict:
+    try:
+        return work()
+    except Exception as error:
+        last = error.__traceback__
+        while last is not None and last.tb_next is not None:
+            last = last.tb_next
+        where = f'{last.tb_frame.f_code.co_filename}:{last.tb_lineno}' if last else ''
+        return _broken(f'{error!r} at {where}')
+
+
+def _broken(what: str) -> Verdict:
+    return Verdict(((6, what),), 0.0, None, 'unknown', '')
+
+
+def _drain(pipe: int, deadline: float) -> bytes | None:
+    """All that comes; None when it does not end in time."""
+    parts: list[bytes] = []
+    while True:
+        left = deadline - time.monotonic()
+        if left <= 0.0 or not select.select([pipe], [], [], left)[0]:
+            return None
+        part = os.read(pipe, 1 << 20)
+        if not part:
+            return b''.join(parts)
+        parts.append(part)

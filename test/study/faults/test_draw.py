@@ -1,0 +1,67 @@
+"""A seed stands for one run, for ever the same, and all cells come equally often."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from itertools import pairwise
+
+import pytest
+
+from maglev_study.faults.catalogue import KINDS
+from maglev_study.faults.draw import PER_MACHINE, cells, from_json, scenario, to_json
+from maglev_study.faults.programme import PHASES, programme
+
+
+def test_every_cell_comes_as_often_as_it_weighs_in_each_round() -> None:
+    number = len(cells())
+    for begin in (0, 3 * number):
+        runs = [scenario(seed) for seed in range(begin, begin + number)]
+        assert Counter((run.faults[0].kind, run.phase) for run in runs) == Counter(cells())
+
+
+def test_every_kind_is_there_in_its_phases() -> None:
+    assert {kind for kind, _ in cells()} == set(KINDS)
+    for phase in PHASES:
+        assert sum(where == phase for _, where in cells()) > 40
+
+
+@pytest.mark.parametrize('double', [False, True])
+def test_a_run_comes_back_from_a_file(double: bool) -> None:
+    for seed in range(0, 4000, 7):
+        run = scenario(seed, double=double)
+        assert len(run.faults) == 1 + double
+        assert run.machine == seed // PER_MACHINE
+        assert all(0 <= fault.delay <= 500 for fault in run.faults)
+        assert from_json(json.loads(json.dumps(to_json(run)))) == run
+
+
+def test_what_is_no_run_is_refused() -> None:
+    plain = to_json(scenario(0))
+    for missing in plain:
+        with pytest.raises(KeyError):
+            from_json({key: value for key, value in plain.items() if key != missing})
+    unhomed = {**plain, 'faults': [{**plain['faults'][0], 'kind': 'not homed'}]}
+    with pytest.raises(ValueError, match='not homed'):
+        from_json({**unhomed, 'phase': 'hover'})
+
+
+def test_sizes_of_slips_are_1_to_50_counts_either_way() -> None:
+    faults = [scenario(seed).faults[0] for seed in range(6 * len(cells()))]
+    sizes = [fault.size for fault in faults if fault.kind.startswith('slip')]
+    assert min(sizes) < -40
+    assert max(sizes) > 40
+    assert all(1 <= abs(size) <= 50 for size in sizes)
+
+
+@pytest.mark.parametrize('number', [0, 1, 2, 3])
+def test_a_programme_has_all_phases_one_after_another(number: int) -> None:
+    course = programme(number)
+    spans = [course.spans[phase] for phase in PHASES[2:]]
+    assert all(start < end for start, end in spans)
+    assert all(before[1] <= after[0] for before, after in pairwise(spans))
+    assert len(course.kind) == len(course.references.position) > spans[-1][1] + 2000
+    for phase in PHASES:
+        start, end = course.spans[phase]
+        assert course.sample_of(phase, 0.0) == start
+        assert course.sample_of(phase, 0.999999) == max(end - 1, start)

@@ -1,0 +1,113 @@
+"""The judge finds a bridge that is broken on purpose, rule by rule, and lets a sound one pass."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from maglev_hw_bridge import faults
+from maglev_hw_bridge.amplifiers import Amplifiers
+from maglev_hw_bridge.board import Board
+from maglev_hw_bridge.drivers.quanser import QuanserDriver
+from maglev_hw_bridge.guard import Guard
+from maglev_hw_bridge.landing import Landing
+from maglev_hw_bridge.stage import BridgeStage
+from maglev_study.faults.judge import Verdict
+from maglev_study.faults.kinds import Fault
+
+Flown = Callable[..., Verdict]
+KILLED = Fault('controller: killed')
+ALOFT = ('lift-off', 0.95)  # at 25 mm
+
+
+def broken(verdict: Verdict) -> set[int]:
+    return {rule for rule, _ in verdict.violations}
+
+
+def test_a_sound_bridge_lands_softly_in_time_and_starts_again(flown: Flown) -> None:
+    verdict = flown(KILLED, 'hover', 0.5)
+    assert verdict.violations == ()
+    assert verdict.ended == 'landed'
+    assert 0.0 < verdict.impact < 0.01
+    assert verdict.detection == pytest.approx(0.005, abs=0.0021)
+    assert 'currents' in verdict.reason
+
+
+def test_no_fault_at_all_is_none(flown: Flown) -> None:
+    verdict = flown(Fault('none'), 'ellipse', 0.4)
+    assert verdict == verdict._replace(violations=(), detection=None, reason='', ended='landed')
+
+
+def test_1_what_is_not_found_out(flown: Flown, monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = Guard.watch
+
+    def blind(self: Guard, *arguments: Any) -> Any:
+        return (0, *sound(self, *arguments)[1:])
+
+    monkeypatch.setattr(Guard, 'watch', blind)
+    assert 1 in broken(flown(Fault('stuck: x or z', (4,)), 'ellipse', 0.5))
+
+
+def test_2_a_landing_that_is_cut(flown: Flown, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Landing, 'step', lambda *_: True)
+    verdict = flown(KILLED, *ALOFT)
+    assert 2 in broken(verdict)
+    assert verdict.ended == 'cut'
+    assert verdict.impact > 0.05
+
+
+def test_2_a_cut_that_is_foretold_too_mildly(flown: Flown, monkeypatch: pytest.MonkeyPatch) -> None:
+    dead_board = Fault('call: persistent', (0,), call='write_analog')
+    assert 2 not in broken(flown(dead_board, *ALOFT))
+    mild = '; the platen strikes the upper stop at about 0.01 m/s'
+    monkeypatch.setattr(faults, 'consequence_of_cut', lambda *_: mild)
+    verdict = flown(dead_board, *ALOFT)
+    assert verdict.impact > 0.2
+    assert 2 in broken(verdict)
+
+
+def test_3_outputs_left_on(flown: Flown, monkeypatch: pytest.MonkeyPatch) -> None:
+    def cut(self: Amplifiers) -> Any:
+        return self.arrays.volts
+
+    monkeypatch.setattr(Amplifiers, 'cut', cut)
+    monkeypatch.setattr(Amplifiers, 'drive', lambda *_: (0, 0))
+    monkeypatch.setattr(Board, 'rest', lambda self: self.put_out(np.full(6, 0.5)))
+    assert 3 in broken(flown(KILLED, 'rest', 0.5))
+
+
+def test_4_enabled_with_the_stop_pressed(flown: Flown, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Board, 'stop_pressed', lambda self: False)
+    verdict = flown(Fault('stop input'), 'arming', 0.5)
+    assert (4, 'amplifiers enabled with the stop pressed') in verdict.violations
+
+
+def test_5_another_one_is_blamed(flown: Flown, monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = BridgeStage._raise_fault
+
+    def raise_fault(self: BridgeStage, kind: str, _reason: str, *rest: Any, **more: Any) -> None:
+        sound(self, kind, 'encoder gap 3 jumped', *rest, **more)
+
+    monkeypatch.setattr(BridgeStage, '_raise_fault', raise_fault)
+    assert 5 in broken(flown(KILLED, 'hover', 0.5))
+    assert 5 not in broken(flown(Fault('jump: a gap', (2,), 300.0), 'hover', 0.5))
+
+
+def test_6_boards_left_open(flown: Flown, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Board, 'release', lambda self: None)
+    assert 6 in broken(flown(KILLED, 'rest', 0.5))
+
+
+def test_6_a_bridge_that_never_comes_back(flown: Flown, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('maglev_study.faults.train._PATIENCE', 2.0)
+
+    def hang(self: QuanserDriver) -> None:
+        while True:
+            pass
+
+    monkeypatch.setattr(QuanserDriver, 'close', hang)
+    verdict = flown(KILLED, 'rest', 0.5)
+    assert verdict.violations == ((6, 'the run hangs'),)

@@ -1,0 +1,98 @@
+"""The command: what it refuses, what it leaves, how it ends."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from maglev_study.faults.draw import from_json, scenario, to_json
+from maglev_study.faults.main import BROKEN, INTERRUPTED, PASS, WRONG_USE, main
+
+
+@pytest.mark.parametrize(
+    'arguments',
+    [
+        ['--runs', '0'],
+        ['--runs', '1.5'],
+        ['--runs', '-3'],
+        ['--jobs', '0'],
+        ['--jobs', 'many'],
+        ['--seed', '-1'],
+        ['--unknown'],
+        ['hover'],
+    ],
+)
+def test_bad_arguments_are_refused(
+    arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as end:
+        main([*arguments, '--out', str(tmp_path)])
+    assert end.value.code == WRONG_USE
+    assert arguments[0] in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('text', ['{}', '[]', 'no JSON', '{"machine": "x"}'])
+def test_a_file_without_a_run_is_refused(
+    text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / 'run.json'
+    path.write_text(text, encoding='utf-8')
+    assert main(['--replay', str(path), '--out', str(tmp_path)]) == WRONG_USE
+    assert str(path) in capsys.readouterr().err
+    assert main(['--replay', str(tmp_path / 'none'), '--out', str(tmp_path)]) == WRONG_USE
+
+
+def test_a_folder_that_cannot_be_is_refused(tmp_path: Path) -> None:
+    (tmp_path / 'file').write_text('', encoding='utf-8')
+    assert main(['--runs', '1', '--out', str(tmp_path / 'file')]) == WRONG_USE
+
+
+def test_a_run_is_the_same_by_its_seed_and_from_a_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    seed = next(seed for seed in range(60) if scenario(seed).phase == 'rest')
+    path = tmp_path / 'run.json'
+    path.write_text(json.dumps([to_json(scenario(seed))]), encoding='utf-8')
+    said = []
+    for which in (str(seed), str(path)):
+        assert main(['--replay', which, '--out', str(tmp_path)]) in (PASS, BROKEN)
+        said.append(capsys.readouterr().out)
+    assert said[0] == said[1]
+    page = (tmp_path / f'run-{seed}.html').read_text(encoding='utf-8')
+    assert 'data:image/png' in page
+    assert 'What happened' in page
+
+
+def test_it_leaves_a_page_and_says_by_its_code_whether_rules_were_broken(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code = main(['--runs', '3', '--jobs', '1', '--out', str(tmp_path)])
+    text = capsys.readouterr().out
+    failures = json.loads((tmp_path / 'failures.json').read_text(encoding='utf-8'))
+    assert code == (BROKEN if failures else PASS)
+    assert f'{3} of 3 runs' in text
+    assert 'the rarest cell' in text
+    assert all(from_json(plain) for plain in failures)
+    assert 'Faults by phase' in (tmp_path / 'faults.html').read_text(encoding='utf-8')
+
+
+def test_ctrl_c_ends_in_order_with_what_was_done(tmp_path: Path) -> None:
+    call = [sys.executable, '-m', 'maglev_study.faults.main', '--runs', '5000', '--jobs', '1']
+    process = subprocess.Popen(
+        [*call, '--out', str(tmp_path)], stdout=subprocess.PIPE, start_new_session=True
+    )
+    assert process.stdout is not None
+    assert b' of 5000 runs' in process.stdout.readline()
+    os.killpg(process.pid, signal.SIGINT)
+    started = time.monotonic()
+    process.communicate(timeout=60.0)
+    assert process.returncode == INTERRUPTED
+    assert time.monotonic() - started < 30.0
+    assert ' of 5000 runs' in (tmp_path / 'faults.html').read_text(encoding='utf-8')
