@@ -57,19 +57,6 @@ class Inbox:
         return ((self._stamped(message), 0) for message in waiting)
 
 
-class Timer:
-    """Ticks, or was cancelled."""
-
-    def __init__(self, period: float) -> None:
-        self.period, self.timer_period_ns, self.ticking = period, 0, True
-
-    def cancel(self) -> None:
-        self.ticking = False
-
-    def reset(self) -> None:
-        self.ticking = True
-
-
 class MadeUpNode:
     """What sampling asks of a node."""
 
