@@ -109,7 +109,9 @@ def _push(o: ObserverArrays, current: FloatArray) -> tuple[float, float, float, 
             current[k], current[k + 1], current[k + 2], angle, o.scale
         )
     machine = machine_from_array(o.machine)
-    return output_accelerations(machine, o.position[Y], o.position[PHI], o.position[THETA], i_d, i_q)
+    return output_accelerations(
+        machine, o.position[Y], o.position[PHI], o.position[THETA], i_d, i_q
+    )
 
 
 @compiled

@@ -14,7 +14,7 @@ from maglev_study.faults.programme import PHASES
 
 FOR_EVER = 10**9
 UNHEARD = 0.6
-"""As hard as the platen may meet a stop when outputs keep their volts, whatever is written [m/s]."""
+"""As hard as the platen may meet a stop where outputs keep their volts, whatever is written."""
 INTERRUPTED = -35
 """What the vendor calls QERR_INTERRUPTED: a signal came during a blocking call."""
 
