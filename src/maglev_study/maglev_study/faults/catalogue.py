@@ -47,7 +47,7 @@ KINDS: dict[str, Kind] = {
         operator(
             'stop service',
             lambda run, fault: run.flight.bridge.emergency_stop(),
-            phases=SAMPLING,
+            phases=tuple(phase for phase in SAMPLING if phase != 'after a fault'),
             blame='emergency stop',
             seen=2,
         ),

@@ -13,6 +13,8 @@ from maglev_study.faults.kinds import CUT, DEGRADED, NOMINAL, Expected, Fault, K
 from maglev_study.faults.programme import PHASES
 
 FOR_EVER = 10**9
+UNHEARD = 0.6
+"""As hard as the platen may meet a stop where outputs keep their volts, whatever is written."""
 INTERRUPTED = -35
 """What the vendor calls QERR_INTERRUPTED: a signal came during a blocking call."""
 
@@ -58,7 +60,7 @@ def encoders(name: str, which: str) -> Kind:
         lasting = name in ('stuck', 'noise')
         hopeless = lasting and gaps > _DISPENSABLE
         one = f'(?:{"|".join(ENCODER_NAMES[target] for target in fault.targets)})'
-        blame = f'encoder {one}(?:, {one})* (?:jumped|is stuck)|contradict'
+        blame = f'encoder {one}(?:, {one})* (?:jumped|is stuck|reads)|contradict'
         return Expected(CUT if hopeless else DEGRADED, 10, blame)
 
     lost_unseen = name in ('slip', 'jump', 'reset') and which != 'gap'
@@ -127,6 +129,8 @@ def calls(mode: str, names: Sequence[str], lasts: bool) -> Kind:
         telling = fault.call in ('task_read_encoder', 'write_analog', 'watchdog_reload')
         if mode == 'wrong result':
             telling = fault.call == 'task_read_encoder'
+            if fault.call == 'write_analog':
+                return Expected(UNHEARD, None, '')
         return Expected(CUT, 3 if telling else None, '', aloft=True)
 
     return Kind(f'call: {mode}', draw, begin, expected, weight=4)
@@ -157,4 +161,5 @@ def amplifier(name: str) -> Kind:
         else:
             world.scale_gain(phase, 0.0 if name == 'dead' else 1.0 + fault.size)
 
-    return Kind(f'phase: {name}', draw, begin, lambda fault: Expected(DEGRADED, None, ''))
+    impact = CUT if name == 'stuck on' else DEGRADED
+    return Kind(f'phase: {name}', draw, begin, lambda fault: Expected(impact, None, ''))
