@@ -396,7 +396,7 @@ def test_load_and_fault_outlast_the_process(tmp_path: Path) -> None:
     cold(second)
     assert second.reset()[0]
     assert second.mode is Mode.READY
-    second.close()
+    second.memory.release()  # as the system does for a process that is killed, here inactive
     third = kept(path)
     third.configure()
     assert third.fault is None
