@@ -12,6 +12,7 @@ from bridge_flight import Flight, ellipse, hover
 from maglev_hw_bridge import guard
 from maglev_hw_bridge.stage import Mode
 from maglev_model.parameters import ParameterError
+from maglev_model.stage import StageError
 
 NOMINAL = 0.01  # [m/s]
 DEGRADED = 0.05  # [m/s]
@@ -154,18 +155,18 @@ def test_after_a_reset_nothing_is_mended_and_the_zero_has_to_be_found_anew() -> 
     stage = flight.stage
     assert stage.reset() == (False, 'the cause is still there: encoder x lost counts: home again')
     stage.deactivate()
-    stage.activate()  # forgets where the platen is, not what is wrong
+    with pytest.raises(StageError, match='a fault is latched: encoder x'):
+        stage.activate()
     assert failed(flight) == {4}
     assert not stage.reset()[0]
-    stage.deactivate()
     flight.rig.place(np.array([0.031, 0.0, 0.0, 0.0, 0.0]))
     flight.boards.jumps[4] -= 40
     flight.boards.tick()
     stage.home()
     assert failed(flight) == set()
     assert not np.any(stage.guard.arrays.offset)
-    stage.activate()
     assert stage.reset()[0]
+    stage.activate()
 
 
 @pytest.mark.parametrize('error', [{}, {'K_v1': 1.1}, {'K_v1': 0.9, 'K_v2': 0.95}, {'K_h': 0.9}])
