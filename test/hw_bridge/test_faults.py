@@ -149,7 +149,7 @@ def test_a_lost_count_is_no_fault_but_many_are_within_3_samples() -> None:
     def slip() -> None:
         flight.boards.jumps[1] += 24
 
-    assert since(flight, slip, 5) == 0
+    assert since(flight, slip, 5) <= 1
     assert 'gap 2 jumped' in str(flight.stage.fault)
     landed(flight)
 

@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 from bridge_flight import OMEGA, Flight, ellipse, hover
 
-from maglev_hw_bridge.landing import impact_of_cut
+from maglev_hw_bridge.landing import Landing, impact_of_cut
+from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.stage import Mode
 from maglev_model.inverse import CurrentLimits, exact_currents
 from maglev_model.machine import machine_constants
+from maglev_model.motor import vertical_force
+from maglev_model.platen import output_accelerations
 
 SOFT = 0.05  # [m/s]
 HEIGHTS = [0.0185, 0.020, 0.0225, 0.025, 0.0285, 0.030, 0.0308]
@@ -111,3 +114,62 @@ def test_landing_on_the_ground_ends_at_once() -> None:
     assert flight.stage.mode is Mode.DISABLED
     flight.stage.resume()
     assert flight.stage.mode is Mode.FOLLOWING
+
+
+def test_no_motor_gets_more_than_the_limit_while_it_lands() -> None:
+    flight = fly(lambda t: ellipse(t + 0.2), 250, **{'landing.current': 0.2})
+    flight.stage.land('test')
+    largest = 0.0
+    for _ in range(40):
+        flight.step(controlled=False)
+        landing = flight.stage.landing
+        largest = max(largest, *np.hypot(landing.direct_current, landing.quadrature_current))
+    assert 0.199 < largest <= 0.2 * (1.0 + 1e-9)
+
+
+def test_rising_it_brakes_sooner_than_falling() -> None:
+    landing = Landing(BridgeParameters())
+    middle = np.array([0.0245, 0.0, 0.0, 0.0, 0.0])
+    for speed, time in ((-0.01, 0.1), (0.01, 0.3)):
+        landing.begin(middle, np.array([speed, 0.0, 0.0, 0.0, 0.0]))
+        assert landing.arrays.braking[0] == pytest.approx(time)
+        assert landing.arrays.level[0] == pytest.approx(middle[0] + 0.5 * time * speed)
+
+
+def test_it_presses_on_the_stop_for_the_settling_time() -> None:
+    flight = fly(hover(0.03), 250)
+    flight.stage.land('test')
+    for _ in range(1499):  # 0.3 s of braking, 1 s down, 0.2 s on the stop
+        flight.step(controlled=False)
+    assert flight.stage.mode is Mode.LANDING
+    flight.run(3, controlled=False)
+    assert flight.stage.mode is Mode.DISABLED
+
+
+@pytest.mark.parametrize(
+    ('blind', 'carrying'),
+    [(1, (1, 3)), (2, (0, 2)), (3, (1, 3)), (4, (0, 2))],
+)
+def test_what_is_not_seen_decides_which_motors_carry(blind: int, carrying: tuple[int, int]) -> None:
+    landing = Landing(BridgeParameters())
+    place, unseen = np.array([0.025, 0.0, 0.0, 0.0, 0.0]), np.zeros(5, np.bool_)
+    unseen[blind] = True
+    landing.begin(place, np.zeros(5), unseen)
+    landing.step(place, np.zeros(5), np.zeros(5))
+    machine = machine_constants(BridgeParameters().machine)
+    pull = [-vertical_force(machine, 0.025, i, 0.0) for i in landing.direct_current]
+    assert sum(pull) == pytest.approx(machine.M_y * machine.G, rel=1e-3)
+    assert sum(pull[i] for i in carrying) > 0.9 * sum(pull)
+    assert landing.arrays.descent_start + landing.arrays.descent_time < 0.5
+
+
+def test_what_the_model_does_not_explain_is_made_up_for() -> None:
+    landing = Landing(BridgeParameters())
+    place, push = np.array([0.025, 0.0, 0.0, 0.0, 0.0]), np.array([1.5, 0.2, 0.0, 0.0, 0.0])
+    landing.begin(place, np.zeros(5))
+    landing.step(place, np.zeros(5), push)
+    machine = machine_constants(BridgeParameters().machine)
+    made = output_accelerations(
+        machine, 0.025, 0.0, 0.0, landing.direct_current, landing.quadrature_current
+    )
+    assert made[:2] == pytest.approx((-1.5, -0.2), abs=0.01)

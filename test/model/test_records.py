@@ -55,6 +55,26 @@ def test_python_and_compiled_functions_share_numbers_and_arrays() -> None:
     assert [type(value) for value in (tank.open, tank.level, tank.turns)] == [bool, float, int]
 
 
+class MarkedTank(Tank):
+    """A tank with a field more."""
+
+    mark: float
+
+
+@compiled
+def work_marked(block: Block) -> float:
+    tank: MarkedTank = block[0]
+    tank.level += tank.mark
+    return tank.level
+
+
+def test_a_record_has_the_fields_of_its_base_before_its_own() -> None:
+    tank = MarkedTank(level=1.25, mark=0.5)
+    assert work_marked(tank.block) == 1.75
+    assert (tank.level, tank.mark) == (1.75, 0.5)
+    assert MarkedTank.dtype.names == (*(Tank.dtype.names or ()), 'mark')
+
+
 def test_records_are_apart_and_of_one_type() -> None:
     one, other = Tank(level=1.0), Tank(turns=5, flags=(1, 0, 1))
     work(one.block)

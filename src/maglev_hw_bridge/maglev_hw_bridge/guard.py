@@ -1,9 +1,9 @@
 """What is watched at every sample: which encoders can be believed, and where the platen is.
 
 The observer foretells what each encoder reads next. A reading that leaps away from that slipped: it
-is put right by as much and goes on being believed, until it leaps again. One that stands still while
-the observer sees the platen move is stuck, and done without. With one gap in doubt the other three
-show how the platen moves; with more, the model must agree with those that are left.
+is put right by as much and goes on being believed, until it leaps again. One that stands still
+while the platen moves is stuck, and done without. With one gap in doubt the other three show how
+the platen moves; with more, the model must agree with those that are left.
 """
 
 from __future__ import annotations

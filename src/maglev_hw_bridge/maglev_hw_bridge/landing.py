@@ -62,8 +62,8 @@ class LandingArrays(Record):
 def land(block: Block, position: FloatArray, rate: FloatArray, disturbance: FloatArray) -> bool:
     """Write the currents of the next sample of the way down; true when the landing is over.
 
-    ``position``, ``rate`` and ``disturbance`` (5,) [m, rad] and by s and s². No motor gets more than the limit, and
-    what carries comes first.
+    ``position``, ``rate`` and ``disturbance`` (5,) [m, rad] and by s and s². No motor gets more
+    than the limit, and what carries comes first.
     """
     landing: LandingArrays = block[0]
     landing.elapsed += landing.period

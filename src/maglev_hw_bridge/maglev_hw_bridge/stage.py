@@ -1,8 +1,8 @@
 """The real stage behind the stage contract: encoders, commutation, amplifiers, boards and faults.
 
-While boards and amplifiers are sound and the encoders tell where the platen is (one that fails can
-be done without), every fault ends in a landing that the bridge makes by itself; otherwise the
-current is cut. Either is latched until :meth:`reset`.
+While boards and amplifiers are sound and at least one gap encoder tells where the platen is, every
+fault ends in a landing that the bridge makes by itself; otherwise the current is cut. Either is
+latched until :meth:`reset`.
 """
 
 from __future__ import annotations
