@@ -115,6 +115,20 @@ def test_an_expired_watchdog_is_honoured(board: int) -> None:
     assert not any(card.expired for card in module.cards)
 
 
+@pytest.mark.parametrize('board', [0, 1])
+def test_what_a_reload_says_is_enough(board: int) -> None:
+    module = Module()
+    driver = driver_on(module)
+    driver.open()
+    driver.start()
+    run(driver)
+    written = [len(card.written) for card in module.cards]
+    module.trouble = Trouble('watchdog_reload', board, times=1, kind='wrong')
+    with pytest.raises(WatchdogError):
+        driver.write(np.ones(12))
+    assert [len(card.written) for card in module.cards] == written
+
+
 def test_a_watchdog_left_expired_by_a_crash_is_cleared_first() -> None:
     module = Module(left_expired=True)
     driver = driver_on(module)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from bridge_flight import HOME, Flight, hover
 
+from maglev_hw_bridge.drivers import DriverError
 from maglev_hw_bridge.drivers.emulated import EmulatedBoards
 from maglev_hw_bridge.drivers.quanser import QuanserDriver
 from maglev_hw_bridge.encoders import HomingError
@@ -395,7 +396,7 @@ def test_load_and_fault_outlast_the_process(tmp_path: Path) -> None:
     cold(second)
     assert second.reset()[0]
     assert second.mode is Mode.READY
-    second.close()
+    second.memory.release()  # as the system does for a process that is killed, here inactive
     third = kept(path)
     third.configure()
     assert third.fault is None
@@ -484,3 +485,23 @@ def test_a_place_that_cannot_be_written_is_said(tmp_path: Path) -> None:
     with pytest.raises(StageError, match=r"parameter 'boards\.memory'"):
         stage.configure()
     assert stage.mode is Mode.CLOSED
+
+
+@pytest.mark.parametrize('error', [DriverError('no boards'), OSError('something else')])
+def test_whatever_opening_raises_gives_everything_back(tmp_path: Path, error: Exception) -> None:
+    stage = kept(tmp_path / 'boards.json')
+    closed: list[bool] = []
+
+    def fails() -> None:
+        raise error
+
+    opens, closes = stage.driver.open, stage.driver.close
+    stage.driver.open = fails  # type: ignore[method-assign]
+    stage.driver.close = lambda: closed.append(True) or closes()  # type: ignore[method-assign]
+    with pytest.raises(StageError if isinstance(error, DriverError) else OSError):
+        stage.configure()
+    assert closed
+    stage.driver.open = opens  # type: ignore[method-assign]
+    again = kept(tmp_path / 'boards.json')
+    again.configure()  # nobody holds them
+    again.close()

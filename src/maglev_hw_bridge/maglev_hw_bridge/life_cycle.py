@@ -83,10 +83,13 @@ class StageLife(abc.ABC):
             load, fault = self.memory.recall()
             self.driver.open()
             self.driver.counts(self._counts)
-        except (DriverError, StageError) as error:
+        except Exception as error:
             self.driver.close()
             self.memory.release()
-            raise StageError(str(error)) from error
+            if isinstance(error, DriverError):
+                raise StageError(str(error)) from error
+            raise
+        self._cool()
         self.amplifiers.arrays.load[:] = np.maximum(load, self.amplifiers.arrays.load)
         self.fault = self.fault or fault
         self.encoders.start(self._counts)

@@ -74,6 +74,14 @@ class BridgeNode(StageNode[BridgeNodeParameters, BridgeStage]):
             )
         self._say_fault('latched since before')
 
+    def activate(self) -> None:
+        """Enable the amplifiers; what a service would have to mend needs a node that stays."""
+        try:
+            super().activate()
+        except StageError as error:
+            hint = ' (start it with autostart:=false for that)' if self._bringing_up else ''
+            raise StageError(f'{error}{hint}') from error
+
     def deactivate(self) -> None:
         """Land, disable the amplifiers; boards that fail at it are a fault."""
         before = self.stage.mode
