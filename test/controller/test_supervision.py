@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import copy
+import functools
+
 import numpy as np
 import pytest
 
@@ -69,8 +72,17 @@ def test_a_landing_cannot_be_called_off(supervisor: Supervisor) -> None:
 # -- every call in every state ---------------------------------------------------------------------
 
 
+QUICK = {'landing.braking_time': 0.05, 'landing.descent_time': 0.1, 'landing.settle_time': 0.01}
+LANDING_SAMPLES = 160
+
+
+@functools.cache
+def _made() -> Supervisor:
+    return Supervisor(build(ControllerParameters, QUICK))
+
+
 def waiting() -> Supervisor:
-    return Supervisor(ControllerParameters())
+    return copy.deepcopy(_made())
 
 
 def regulating() -> Supervisor:
@@ -176,7 +188,7 @@ def test_every_call_in_every_state(call: str, state: str) -> None:
     assert supervisor.mode == at_once
     flight = Flight(supervisor)
     flight.sequence = 10
-    for _ in range(2450):  # a landing takes 2.4 s
+    for _ in range(LANDING_SAMPLES + 5):
         flight.step(Phase.TRACK, HOVER, 0.025)
         flew = supervisor.flying
         assert flew == bool(np.any(supervisor.direct_current))
@@ -229,8 +241,8 @@ def test_a_stage_that_begins_anew_ends_flights_but_no_faults(state: str, mode: M
 def test_a_landing_goes_on_whoever_asks_for_another(call: str) -> None:
     plain, asked = landing(), landing()
     arguments = ('the test',) if call == 'stop' else ()
-    for n in range(300):
-        if n == 100:
+    for n in range(120):
+        if n == 60:
             getattr(asked, call)(*arguments)
         for supervisor in (plain, asked):
             supervisor.step(-1, np.full(4, 0.025), 0.0, 0.0)
@@ -284,7 +296,7 @@ def test_a_second_retuning_during_the_first_ones_fade_makes_no_jump() -> None:
         flight.step(Phase.TRACK, HOVER, 0.0251)
     for bandwidth in (180.0, 240.0):
         before = supervisor.regulator.virtual_input.copy()
-        changed = build(ControllerParameters, {'y.bandwidth': bandwidth})
+        changed = build(ControllerParameters, {**QUICK, 'y.bandwidth': bandwidth})
         regulator = Regulator(changed)
         supervisor.adopt(regulator, model_maps(supervisor.regulator.arrays, regulator.arrays))
         flight.step(Phase.TRACK, HOVER, 0.0251)
@@ -294,12 +306,12 @@ def test_a_second_retuning_during_the_first_ones_fade_makes_no_jump() -> None:
 
 def test_what_cannot_change_in_flight_is_refused_also_when_it_took_off_meanwhile() -> None:
     supervisor = waiting()
-    heavier = Regulator(build(ControllerParameters, {'machine.mass_y': 7.5}))
+    heavier = Regulator(build(ControllerParameters, {**QUICK, 'machine.mass_y': 7.5}))
     maps = model_maps(supervisor.regulator.arrays, heavier.arrays)
     flying = regulating()
     with pytest.raises(ParameterError, match='mass_y'):
         flying.adopt(heavier, maps)
-    assert flying.parameters == ControllerParameters()
+    assert flying.parameters == _made().parameters
     supervisor.adopt(heavier, maps)
     assert supervisor.parameters.machine.mass_y == 7.5
 

@@ -74,10 +74,16 @@ def height(observer: Observer) -> float:
 def answer(observer: Observer) -> Callable[..., None]:
     """A controller of the test's own, that wants the same direct current [A] of every motor."""
     publisher = observer.node.create_publisher(Currents, CURRENTS, sample_qos())
+    answered = 0
 
     def publish(sequence: int, current: float = 0.0) -> None:
-        measured = [m for m in observer.messages[MEASUREMENT] if m.sequence == sequence]
-        message = Currents(header=measured[0].header, sequence=sequence, session=1)
+        nonlocal answered
+        measured = observer.messages[MEASUREMENT]
+        if len(measured) == answered:  # nothing new, not even a sample that is repeated
+            return
+        answered = len(measured)
+        header = next(m.header for m in measured if m.sequence == sequence)
+        message = Currents(header=header, sequence=sequence, session=1)
         message.direct_current = [current] * 4
         message.status = Currents.FLYING if current else Currents.RESTING
         publisher.publish(message)

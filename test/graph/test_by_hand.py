@@ -1,0 +1,65 @@
+"""While gains are designed the controller's node serves by hand what must not wait."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+
+import pytest
+import rclpy
+from graph import Observer
+from std_srvs.srv import Trigger
+
+from maglev_controller.node import ControllerNode
+from maglev_controller.parameters import ControllerParameters
+from maglev_model.modes import Mode
+from maglev_model.parameters import ParameterError, replace
+
+
+@pytest.fixture
+def controller(monkeypatch: pytest.MonkeyPatch) -> Iterator[ControllerNode]:
+    """The node, in this process."""
+    monkeypatch.setattr('sys.argv', ['controller'])
+    rclpy.init(args=[])
+    node = ControllerNode()
+    yield node
+    node.destroy_node()
+    rclpy.try_shutdown()
+
+
+class EndlessDesign:
+    """A design that ends when the supervisor is in a fault."""
+
+    def __init__(self, node: ControllerNode) -> None:
+        self._node = node
+        self._begun = time.monotonic()
+
+    @property
+    def done(self) -> bool:
+        return self._node.supervisor.mode == Mode.FAULT or time.monotonic() > self._begun + 30.0
+
+    def result(self) -> None:
+        raise ParameterError('it ended')
+
+
+def test_an_emergency_stop_does_not_wait_for_a_design(
+    controller: ControllerNode, observer: Observer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def redesign(_parameters: ControllerParameters) -> EndlessDesign:
+        return EndlessDesign(controller)
+
+    monkeypatch.setattr(controller.supervisor, 'redesign', redesign)
+    client = observer.node.create_client(Trigger, '/controller/emergency_stop')
+    asked = observer.begin_to_ask(client, Trigger.Request())
+    with pytest.raises(ParameterError, match='it ended'):
+        controller.on_parameters(replace(controller.parameters, {'y.bandwidth': 180.0}))
+    assert controller.supervisor.reason == 'emergency stop'
+    observer.wait(lambda: observer.serve(0.01) is None and asked.done())
+    assert asked.result().success
+    # What was served by hand does not disturb the executor, which is told of it afterwards.
+    client = observer.node.create_client(Trigger, '/controller/reset')
+    asked = observer.begin_to_ask(client, Trigger.Request())
+    end = time.monotonic() + 30.0
+    controller.spin(lambda: controller.supervisor.mode == Mode.DISABLED or time.monotonic() > end)
+    observer.wait(lambda: observer.serve(0.01) is None and asked.done())
+    assert asked.result().message == 'cleared: emergency stop'
