@@ -32,6 +32,7 @@ _FLYING = 1e-4  # above the lower stop [m]
 _OFF_COURSE = (1.5e-3, 3e-3, 3e-3)  # of y, x, z while nothing is found out [m]
 _FALL = 600  # longest, without current [samples]
 _CUT_SAMPLES = 3
+_WATCHDOG = 20  # [samples]
 _FORETOLD = re.compile(r'strikes the \w+ stop at about ([\d.]+) m/s')
 _LONGEST = 16_000
 
@@ -209,7 +210,8 @@ class Judge:
         else:
             over = self._n if self.ended is None else self.ended
             at = min(over if self.seen is None else self.seen, self._n - 1)
-            foretold = self._fall_from(max(at - 1, 0))
+            expired = min(at + _WATCHDOG, self._n - 1)  # by then a watchdog has cut
+            foretold = max(self._fall_from(max(at - 1, 0)), self._fall_from(expired))
         most = max(DEGRADED, 1.15 * foretold + 0.03)
         if impact > most:
             self.blame(2, f'struck a stop at {impact:.3f} m/s, a cut was to give {foretold:.2f}')
