@@ -32,6 +32,7 @@ _FLYING = 1e-4  # above the lower stop [m]
 _OFF_COURSE = (1.5e-3, 3e-3, 3e-3)  # of y, x, z while nothing is found out [m]
 _FALL = 600  # longest, without current [samples]
 _CUT_SAMPLES = 3
+_WATCHDOG = 20  # [samples]
 _FORETOLD = re.compile(r'strikes the \w+ stop at about ([\d.]+) m/s')
 _LONGEST = 16_000
 
@@ -154,7 +155,7 @@ class Judge:
         first = self._first_sign(shows)
         impact = max(self.flight.world.rig.impact, self._across())
         self._judge_detection(expected, first)
-        self._judge_impact(expected, impact, first)
+        self._judge_impact(expected, impact)
         self._judge_outputs()
         if self.reason and expected.blame and not re.search(expected.blame, self.reason):
             self.blame(5, f'blamed: {self.reason}')
@@ -198,7 +199,7 @@ class Judge:
                 worst = 1e3 * np.nanmax(error[: seen + 1], axis=0)
                 self.blame(1, f'unseen, and off course by {np.round(worst, 1)} mm in y, x, z')
 
-    def _judge_impact(self, expected: Expected, impact: float, first: int | None) -> None:
+    def _judge_impact(self, expected: Expected, impact: float) -> None:
         if expected.impact is not CUT:
             if impact > expected.impact:
                 self.blame(2, f'struck a stop at {impact:.3f} m/s, at most {expected.impact:g}')
@@ -207,8 +208,10 @@ class Judge:
         if told:
             foretold = float(told.group(1))
         else:
-            at = min(self.seen if self.seen is not None else (first or 0), self._n - 1)
-            foretold = self._fall_from(max(at - 1, 0))
+            over = self._n if self.ended is None else self.ended
+            at = min(over if self.seen is None else self.seen, self._n - 1)
+            expired = min(at + _WATCHDOG, self._n - 1)  # by then a watchdog has cut
+            foretold = max(self._fall_from(max(at - 1, 0)), self._fall_from(expired))
         most = max(DEGRADED, 1.15 * foretold + 0.03)
         if impact > most:
             self.blame(2, f'struck a stop at {impact:.3f} m/s, a cut was to give {foretold:.2f}')
