@@ -43,7 +43,7 @@ class SamplePublisher:
             self._true_publisher = node.create_publisher(PlantState, TRUE_STATE, sample_qos())
         self._clock_publisher: Any = None
         if self._measurement.lockstep:
-            self._clock_publisher = node.create_publisher(Clock, CLOCK, 10)
+            self._clock_publisher = node.create_publisher(Clock, CLOCK, sample_qos())
 
     def start(self) -> None:
         """Let stage time begin with what is published next."""
