@@ -62,8 +62,8 @@ def test_the_rough_machine_flies_on_the_bridge() -> None:
     rough = from_yaml(BridgeParameters, 'hw_bridge', PARAMS / 'rough.yaml')
     given = {k: v for k, v in values(rough).items() if k.startswith(('effects.', 'emulation.'))}
     flight = Flight(ellipse, given)
-    flight.run(1500)
+    flight.run(3000)
     assert flight.stage.fault is None, flight.stage.fault
     assert flight.stage.mode is Mode.FOLLOWING
-    error = flight.rig.state[::2] - ellipse(1.5)[0]
+    error = flight.rig.state[::2] - ellipse(2.999)[0]
     assert np.all(np.abs(error) < 1e-4)

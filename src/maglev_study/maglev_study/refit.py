@@ -78,7 +78,8 @@ def _growing(p: FloatArray) -> dict[str, object]:
 
 
 def _unlike(p: FloatArray) -> dict[str, object]:
-    return {**_sprung(p), 'effects.motor.magnet': (1.0, 1.0 + float(p[5]), 1.0, 1.0 - float(p[5]))}
+    unlike = (1.0, 1.0 + float(p[6]), 1.0, 1.0 - float(p[6]))
+    return {**_loaded(p), 'effects.motor.magnet': unlike}
 
 
 _AXES = (0.303, 0.171, 0.149, 1.32)
@@ -90,7 +91,12 @@ CANDIDATES = (
     Candidate('axes, spring of theta unknown', (*_AXES, 0.8), (*_AXES, 1.0), _sprung),
     Candidate('spring, tilt presses z', (*_AXES, 0.7, 8.5), (*_AXES, 1.0, 10.0), _loaded),
     Candidate('spring that grows with the gap', (*_AXES, 0.7, 10.0), (*_AXES, 1.0, 10.0), _growing),
-    Candidate('spring, motors 2 and 4 unlike', (*_AXES, 0.7, 0.02), (*_AXES, 1.0, 0.02), _unlike),
+    Candidate(
+        'spring, tilt presses z, motors 2 and 4 unlike',
+        (*_AXES[:3], 1.2, 0.68, 8.5, 0.14),
+        (*_AXES, 1.0, 10.0, 0.1),
+        _unlike,
+    ),
 )
 
 

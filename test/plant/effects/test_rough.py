@@ -79,7 +79,7 @@ def test_rough_switches_on_the_same_for_both_stages() -> None:
     off = EffectParameters()
     for group in values(off):
         name = group.split('.')[0]
-        if name == 'spring':  # of the paper's machine, if at all: see the refit
+        if name == 'spring':  # a supposition that nothing supports
             continue
         assert getattr(plant.effects, name) != getattr(off, name), name
 
