@@ -324,8 +324,12 @@ class FloorParameters:
 class HeatParameters:
     """Warmer than where the model's constants hold, reached exponentially."""
 
-    magnets: float = parameter(0.0, 'rise of the magnets in the end', unit='K', within=(-50.0, 100.0))
-    copper: float = parameter(0.0, 'rise of the windings in the end', unit='K', within=(-50.0, 150.0))
+    magnets: float = parameter(
+        0.0, 'rise of the magnets in the end', unit='K', within=(-50.0, 100.0)
+    )
+    copper: float = parameter(
+        0.0, 'rise of the windings in the end', unit='K', within=(-50.0, 150.0)
+    )
     time: float = parameter(
         0.0, 'time constant; 0: warm from the start', unit='s', within=(0.0, 1e5)
     )
