@@ -61,12 +61,11 @@ class RegulatorModelParameters(FundamentalParameters):
         'realisation: companion is (15) to the letter, modal is for many frequencies',
         choices=('modal', 'companion'),
     )
-    friction_slope: float = parameter(
-        1500.0,
-        'steepest friction against velocity that standing still stays stable with: phases '
-        'the oscillators of LQR designs, and is checked; 0: not',
-        unit='1/s',
-        within=(0.0, 1e6),
+    rest: str = parameter(
+        'fade',
+        "where an axis' reference rests, its oscillators fade, and standing still is stable "
+        'and quiet with any friction (modal form); or they hold, as in the paper',
+        choices=('fade', 'hold'),
     )
     largest_error: tuple[float, ...] = parameter(
         (1e-4, 1e-4, 1e-4, 2e-4, 2e-4),
@@ -133,6 +132,49 @@ class ObserverParameters:
         'where it turns from believing its prediction to believing the encoders',
         unit='rad/s',
         within=(1.0, 1e5),
+    )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class EncoderParameters:
+    """What is known of the encoders: a reading says no more than which count the length is in."""
+
+    gap_resolution: float = parameter(
+        10e-6, 'count of the gap encoders, 0 for none', unit='m', within=(0.0, 1e-3)
+    )
+    horizontal_resolution: float = parameter(
+        10e-6, 'count of the x and z encoders, 0 for none', unit='m', within=(0.0, 1e-3)
+    )
+    rounding: str = parameter(
+        'nearest',
+        'whole counts are the nearest, or the next below: then half a count is added',
+        choices=('nearest', 'floor'),
+    )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class FrictionParameters:
+    """Friction fed forward, its level learned in flight."""
+
+    adaptation_time: float = parameter(
+        2.0,
+        'time over which its level is learned; 0: none is fed forward',
+        unit='s',
+        within=(0.0, 1e3),
+    )
+    way: tuple[float, ...] = parameter(
+        (4e-6, 4e-6, 4e-6, 4e-6, 4e-6),
+        'way over which it turns after a reversal, per axis',
+        unit='m, rad',
+        within=(1e-8, 1.0),
+        length=5,
+    )
+    largest: tuple[float, ...] = parameter(
+        (1.0, 1.0, 1.0, 5.0, 5.0),
+        'level that is learned at most, per axis',
+        unit='m/s^2, rad/s^2',
+        within=(0.0, 100.0),
+        length=5,
     )
 
 
@@ -282,6 +324,8 @@ class ControllerParameters:
     )
     observer: ObserverParameters = group(ObserverParameters)
     derivative: DerivativeParameters = group(DerivativeParameters)
+    encoder: EncoderParameters = group(EncoderParameters)
+    friction: FrictionParameters = group(FrictionParameters)
     y: AxisParameters = group(AxisParameters)
     x: AxisParameters = group(AxisParameters)
     z: AxisParameters = group(AxisParameters)

@@ -29,8 +29,10 @@ from maglev_controller.control_arrays import (
 from maglev_controller.design.axis_design import AxisDesign
 from maglev_controller.design.margins import LoopMargins, all_margins, check_margins
 from maglev_controller.design.observer import NO_OBSERVER
+from maglev_controller.estimation import DOUBT
 from maglev_controller.laws import control_law
-from maglev_controller.parameters import ControllerParameters
+from maglev_controller.parameters import ControllerParameters, EncoderParameters
+from maglev_controller.rest import FADING_TIME as REST_FADING_TIME
 from maglev_controller.sample_step import (
     BAD_REFERENCE,
     FIRST_FAULT,
@@ -209,6 +211,8 @@ def _control_arrays(
         models['output'][index, :n] = design.gain[2:]
         models['drive'][index, :n] = design.drive
         models['antiwindup'][index, :n] = design.antiwindup
+        if design.fades and design.model is not None:
+            models['oscillates'][index, :n] = design.model.oscillating
         transition[index, :n, :n] = design.transition
     return ControlArrays(
         records=records,
@@ -255,4 +259,27 @@ def _settings(
         'late': parameters.input_delay > 0,
         'paper_antiwindup': parameters.internal_model.antiwindup == 'paper',
         'fade': math.exp(-parameters.sample_time / FADING_TIME),
+        'rest_fades': any(design.fades for design in designs),
+        'doubt': DOUBT if any(design.fades for design in designs) else 0.0,
+        'waking': -math.expm1(-parameters.sample_time / REST_FADING_TIME),
+        **_counts(parameters.encoder),
+        **_friction(parameters),
+    }
+
+
+def _counts(encoder: EncoderParameters) -> dict[str, ArrayLike]:
+    return {
+        'half_gap': 0.5 * encoder.gap_resolution,
+        'half_horizontal': 0.5 * encoder.horizontal_resolution,
+        'floored': encoder.rounding == 'floor',
+    }
+
+
+def _friction(parameters: ControllerParameters) -> dict[str, ArrayLike]:
+    friction = parameters.friction
+    time = friction.adaptation_time
+    return {
+        'friction_gain': -math.expm1(-parameters.sample_time / time) if time > 0.0 else 0.0,
+        'friction_way': friction.way,
+        'friction_limit': friction.largest,
     }

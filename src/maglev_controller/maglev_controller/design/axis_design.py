@@ -24,9 +24,8 @@ class AxisDesign:
     = α e + w that it is designed for: 0 where the inverse takes all of it away.
 
     ``limits_errors``: large errors are fed back and learned from only as far as the parameters
-    ``limits.error`` and ``internal_model.largest_error`` say. ``can_hunt``: with friction at rest
-    it may hunt, which is looked into. ``model`` is the internal model that ξ is the state of, where
-    it is one.
+    ``limits.error`` and ``internal_model.largest_error`` say. ``fades``: where the reference rests,
+    oscillators fade. ``model`` is the internal model that ξ is the state of, where it is one.
     """
 
     gain: FloatArray
@@ -37,13 +36,33 @@ class AxisDesign:
     observer: Observer = NO_OBSERVER
     stiffness: float = 0.0
     limits_errors: bool = False
-    can_hunt: bool = False
+    fades: bool = False
     model: InternalModel | None = None
 
     @property
     def order(self) -> int:
         """Number of states n."""
         return int(self.drive.size)
+
+
+def resting(design: AxisDesign, doubt: float) -> AxisDesign:
+    """What is left of a design that fades where the reference has rested for long.
+
+    That is the integrator of the internal model alone, and an observer that believes counts less by
+    ``doubt``, 0 to 1.
+    """
+    assert design.model is not None
+    kept = ~design.model.oscillating
+    states = np.concatenate(([True, True], kept))
+    believed = (1.0 - doubt) * np.array(design.observer)
+    return dataclasses.replace(
+        design,
+        gain=design.gain[states],
+        transition=design.transition[np.ix_(kept, kept)],
+        drive=design.drive[kept],
+        antiwindup=design.antiwindup[kept],
+        observer=Observer(*believed.tolist()),
+    )
 
 
 def controller_system(design: AxisDesign, period: float, delay: int) -> StateSpace:

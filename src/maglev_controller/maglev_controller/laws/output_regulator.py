@@ -43,8 +43,9 @@ def design(parameters: ControllerParameters, axis: str) -> AxisDesign:
     shared, period = parameters.internal_model, parameters.sample_time
     model = _model(parameters, axis)
     gain = _gain(chosen, model, period, axis)
-    if shared.friction_slope > 0.0 and chosen.design != 'poles' and model.form == 'modal':
-        gain = split_phase(model, gain, shared.friction_slope)
+    fades = shared.rest == 'fade' and model.form == 'modal'
+    if fades and chosen.design != 'poles':
+        gain = split_phase(model, gain)
     gain[2:] += model.output
     inputs = np.stack([model.input, _paper_antiwindup(chosen, model, axis)], axis=1)
     transition, driven = discretise(model.state, inputs, period)
@@ -64,7 +65,7 @@ def design(parameters: ControllerParameters, axis: str) -> AxisDesign:
         ),
         observer=observer(parameters.observer.bandwidth, period) if watched else NO_OBSERVER,
         limits_errors=True,
-        can_hunt=True,
+        fades=fades,
         model=model,
     )
 
