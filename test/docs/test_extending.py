@@ -19,6 +19,8 @@ from maglev_monitor.bag.reader import Bag
 from maglev_monitor.metrics.joiner import Joiner
 from maglev_monitor.metrics.run_metrics import RunMetrics
 from maglev_monitor.metrics.run_parameters import RunParameters
+from maglev_plant.parameters import PlantParameters
+from maglev_plant.simulation import SimulatedStage
 from maglev_reference.parameters import ReferenceParameters
 from maglev_study.flight import fly
 
@@ -40,7 +42,7 @@ def my_stage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 def test_every_module_of_the_page_is_there(my_stage: Path) -> None:
     names = {path.name for path in my_stage.iterdir()}
-    assert names == {'law.py', 'boards.py', 'path.py', 'effort.py'}
+    assert names == {'law.py', 'boards.py', 'path.py', 'effort.py', 'models.py'}
 
 
 def test_a_law_flies() -> None:
@@ -63,6 +65,21 @@ def test_a_driver_carries_the_bridge() -> None:
     assert np.any(stage.driver.volts)  # type: ignore[attr-defined]
     stage.close()
     assert not np.any(stage.driver.volts)  # type: ignore[attr-defined]
+
+
+def test_models_of_ones_own_make_the_plant() -> None:
+    overlays = re.findall(r'```yaml\n(.*?)```', TEXT, re.DOTALL)
+    given = next(yaml.safe_load(text) for text in overlays if 'effects' in text)
+    groups = given['/**']['ros__parameters']['effects']
+    hanging = {'initial.position': (0.025, 0.0, 0.0, 0.0, 0.0)}
+    models = {f'effects.{group}.model': value['model'] for group, value in groups.items()}
+    stage = SimulatedStage(build(PlantParameters, {**hanging, **models}))
+    for _ in range(4):
+        sample = stage.read()
+    assert stage.state[1] == pytest.approx((9.81 - 4.0 * 25.0 / 6.9) * 3e-3, rel=0.1)
+    assert sample.gap[0] == pytest.approx(stage.state[0], abs=20e-6)
+    counts = sample.gap[0] / 1e-6
+    assert counts == pytest.approx(round(counts), abs=1e-6)
 
 
 def test_a_trajectory_is_checked_and_flown() -> None:

@@ -14,6 +14,7 @@ from maglev_hw_bridge.signal_parameters import (
 )
 from maglev_model.machine import MachineParameters
 from maglev_model.parameters import ParameterError, group, parameter
+from maglev_plant.effects.parameters import EffectParameters
 
 _BY_AXIS = ', by axis y, x, z, phi, theta'
 
@@ -157,6 +158,7 @@ class BridgeParameters:
     fault: FaultParameters = group(FaultParameters)
     landing: BridgeLandingParameters = group(BridgeLandingParameters)
     emulation: EmulationParameters = group(EmulationParameters)
+    effects: EffectParameters = group(EffectParameters)  # of the emulated machine
 
     def __post_init__(self) -> None:
         """Refuse what the groups alone cannot show to be wrong."""

@@ -18,10 +18,15 @@ from maglev_hw_bridge.signal_parameters import check_places, check_signs
 from maglev_model.axes import FloatArray
 from maglev_model.commutation import SCALES, direct_quadrature_currents
 from maglev_model.compiled import compiled
+from maglev_model.machine import Machine
+from maglev_model.machine_array import machine_from_array
 from maglev_model.parameters import ParameterError
 from maglev_model.records import Block, Record
 from maglev_plant.arrays import StageArrays, stage_arrays
 from maglev_plant.dynamics import advance
+from maglev_plant.effects.drive import aim, command_phases
+from maglev_plant.effects.parameters import DriveParameters
+from maglev_plant.effects.winding import carry_currents, set_current_loop
 from maglev_plant.encoder import encode
 from maglev_plant.parameters import AmplifierParameters, PlantParameters
 
@@ -41,6 +46,7 @@ class RigArrays(Record):
     angle: Annotated[FloatArray, 4]  # of motors 1..4 at displacement 0 [rad]
     gain: Annotated[FloatArray, 12]  # [A/V], with the sign; 0 for a dead phase
     offset: Annotated[FloatArray, 12]  # [V]
+    driven: bool  # whether converters, latency or spread are among the stage's effects
     gap_count: float  # [m]
     horizontal_count: float  # [m]
     upper_stop: float  # [m]
@@ -51,11 +57,10 @@ class RigArrays(Record):
 
 
 @compiled
-def _flow(rig: RigArrays, volts: FloatArray) -> None:
-    """Carry the phase currents over one step with the boards' outputs held."""
+def _flow(rig: RigArrays, targets: FloatArray) -> None:
+    """Carry the phase currents over one step towards their targets (12,) [A]."""
     for i in range(12):
-        target = rig.gain[i] * (volts[i] - rig.offset[i])
-        target = min(max(target, -rig.peak), rig.peak)
+        target = targets[i]
         wanted = target + rig.decay * (rig.current[i] - target)
         rest = rig.voltage_decay * rig.current[i]
         reach = (1.0 - rig.voltage_decay) * rig.short_current
@@ -80,6 +85,40 @@ def _commute(rig: RigArrays, stage: StageArrays, before: FloatArray) -> None:
 
 
 @compiled
+def _aim(
+    rig: RigArrays, stage: StageArrays, wanted: FloatArray, n: int, steps: int, out: FloatArray
+) -> None:
+    """What the current loops aim at in step ``n`` of a sample, ``out`` (12,) [A]."""
+    if rig.driven:
+        aim(stage.effects.drive, n / steps, (n + 1) / steps, out)
+    else:
+        out[:] = wanted
+    for i in range(12):
+        out[i] = min(max(out[i], -rig.peak), rig.peak)
+
+
+@compiled
+def _carry(rig: RigArrays, stage: StageArrays, machine: Machine, targets: FloatArray) -> None:
+    """Carry the phase currents over one step, and set i_d and i_q by which the forces go."""
+    effects = stage.effects
+    if effects.winding.on:
+        carry_currents(
+            machine,
+            effects.motors,
+            effects.winding,
+            stage.state,
+            targets,
+            stage.step,
+            stage.command,
+        )
+        rig.current[:] = effects.winding.phase
+        return
+    before = rig.current.copy()
+    _flow(rig, targets)
+    _commute(rig, stage, before)
+
+
+@compiled
 def _touching(rig: RigArrays, stage: StageArrays) -> bool:
     """Whether a seat of the platen is at a vertical stop."""
     y, phi, theta = stage.state[0], stage.state[6], stage.state[8]
@@ -94,10 +133,13 @@ def advance_rig(rig_block: Block, stage_block: Block, volts: FloatArray, steps: 
     rig: RigArrays = rig_block[0]
     stage: StageArrays = stage_block[0]
     state = stage.state
-    for _ in range(steps):
-        before = rig.current.copy()
-        _flow(rig, volts)
-        _commute(rig, stage, before)
+    machine = machine_from_array(stage.machine)
+    wanted, targets = rig.gain * (volts - rig.offset), np.empty(12)
+    if rig.driven:
+        command_phases(stage.effects.drive, stage.seed, stage.sample, wanted)
+    for n in range(steps):
+        _aim(rig, stage, wanted, n, steps, targets)
+        _carry(rig, stage, machine, targets)
         away = not _touching(rig, stage)
         tilting = max(abs(state[7]), abs(state[9]))
         speed = abs(state[1]) + rig.seat_radius * tilting
@@ -134,6 +176,10 @@ class Rig:
         step = parameters.sample_time / self.steps
         self.stage = stage_arrays(_plant(parameters, step))
         self.arrays = _rig_arrays(parameters, step)
+        self.stage.effects.by_phases = False  # phases are the rig's
+        winding = self.stage.effects.winding
+        winding.offset[:] = self.arrays.angle
+        set_current_loop(winding, emulation.winding.bandwidth, step)
         self._total = np.zeros(6, dtype=np.int64)
         count(self.arrays.block, self.stage.block, self._total)
         direction = np.array(self.wiring.encoder_direction, dtype=np.int64)
@@ -166,6 +212,7 @@ class Rig:
         """Put the platen somewhere, as by hand: (5,) each [m, rad] and per second."""
         self.stage.state[::2] = position
         self.stage.state[1::2] = 0.0 if velocity is None else velocity
+        self.stage.effects.winding.last[:] = self.stage.state
 
     @property
     def phase_current(self) -> FloatArray:
@@ -202,6 +249,7 @@ def _plant(parameters: BridgeParameters, step: float) -> PlantParameters:
         disturbance=emulation.disturbance,
         offset=emulation.offset,
         initial=emulation.initial,
+        effects=parameters.effects,
     )
 
 
@@ -215,9 +263,10 @@ def _rig_arrays(parameters: BridgeParameters, step: float) -> RigArrays:
         peak=winding.peak_current,
         wave=math.pi / machine.pole_pitch,
         scale=SCALES[parameters.commutation.dq_scaling],
-        angle=wiring.angle,
+        angle=np.array(wiring.angle) + parameters.effects.motor.commutation,
         gain=np.array(wiring.gain) * np.array(wiring.phase_sign),
         offset=wiring.offset,
+        driven=parameters.effects.drive != DriveParameters(),
         gap_count=emulation.encoder.gap_resolution,
         horizontal_count=emulation.encoder.horizontal_resolution,
         upper_stop=machine.gap_min,

@@ -22,7 +22,7 @@ import yaml
 
 T = TypeVar('T')
 
-SHARED_GROUPS = ('machine', 'guide', 'internal_model', 'y', 'x', 'z', 'phi', 'theta')
+SHARED_GROUPS = ('machine', 'guide', 'effects', 'internal_model', 'y', 'x', 'z', 'phi', 'theta')
 """Groups that a parameter file may give to all nodes at once, under ``/**``.
 
 A node that has no such group leaves it to the others; one that has it refuses what is wrong in it.

@@ -16,35 +16,52 @@ Block = NDArray[np.void]
 
 
 class Record:
-    """The fields that a subclass annotates: ``float``, ``int``, ``bool``, or an array.
+    """The fields that a subclass annotates: numbers, arrays, and other records.
 
-    ``Annotated[NDArray[np.float64], 2, 6]`` is an array of shape (2, 6). :attr:`block`, shape (1,),
+    A number is ``float``, ``int`` or ``bool``; ``Annotated[NDArray[np.float64], 2, 6]`` is an array
+    of shape (2, 6); a record within a record shares its memory. :attr:`block`, shape (1,),
     is what compiled functions take from Python; ``block[0]`` is there what they give each other,
     with the fields as attributes, and is annotated with the subclass.
     """
 
     dtype: ClassVar[np.dtype[np.void]]
+    _records: ClassVar[dict[str, type[Record]]]
 
     def __init_subclass__(cls) -> None:
         fields = inspect.get_annotations(cls, eval_str=True)
         cls.dtype = np.dtype([(name, *_element(hint)) for name, hint in fields.items()], align=True)
+        cls._records = {name: hint for name, hint in fields.items() if _is_record(hint)}
         for name in fields:
-            setattr(cls, name, _array(name) if cls.dtype[name].shape else _number(name))
+            array = name in cls._records or cls.dtype[name].shape
+            setattr(cls, name, _array(name) if array else _number(name))
 
     def __init__(self, **values: Any) -> None:
         """Fields that no value is given for are zero. Raises ValueError for what is no field."""
-        self.block: Block = np.zeros(1, self.dtype)
-        self._arrays = {name: self.block[name][0] for name in self.dtype.names or ()}
+        self._hold(np.zeros(1, self.dtype))
         for name, value in values.items():
-            self.block[name] = value
+            self.block[name] = value.block if name in self._records else value
+
+    def _hold(self, block: Block) -> None:
+        self.block: Block = block
+        self._arrays: dict[str, Any] = {name: block[name][0] for name in self.dtype.names or ()}
+        for name, record in self._records.items():
+            within = record.__new__(record)
+            within._hold(block[name])
+            self._arrays[name] = within
 
 
 def _element(hint: Any) -> tuple[Any, tuple[int, ...]]:
     """Type and shape of one field."""
+    if _is_record(hint):
+        return hint.dtype, ()
     if not hasattr(hint, '__metadata__'):
         return hint, ()
     _, dtype = get_args(hint.__origin__)
     return get_args(dtype)[0], hint.__metadata__
+
+
+def _is_record(hint: Any) -> bool:
+    return isinstance(hint, type) and issubclass(hint, Record)
 
 
 def _number(name: str) -> property:

@@ -19,7 +19,7 @@ from maglev_plant.arrays import StageArrays
 
 
 @compiled
-def _limit_phase(stage: StageArrays, phase: int, current: float) -> float:
+def limit_phase(stage: StageArrays, phase: int, current: float) -> float:
     """Clip one phase's current [A] to what its amplifier can give now, and heat it for a sample."""
     load = stage.load[phase]
     if load >= 1.0:
@@ -42,9 +42,9 @@ def set_targets(stage: StageArrays, machine: Machine) -> None:
         angle = electrical_angle(machine, displacement)
         wanted_d, wanted_q = stage.command[motor], stage.command[4 + motor]
         want_a, want_b, want_c = phase_currents(wanted_d, wanted_q, angle, scale)
-        a = _limit_phase(stage, 3 * motor, want_a)
-        b = _limit_phase(stage, 3 * motor + 1, want_b)
-        c = _limit_phase(stage, 3 * motor + 2, want_c)
+        a = limit_phase(stage, 3 * motor, want_a)
+        b = limit_phase(stage, 3 * motor + 1, want_b)
+        c = limit_phase(stage, 3 * motor + 2, want_c)
         if a != want_a or b != want_b or c != want_c:
             wanted_d, wanted_q = direct_quadrature_currents(a, b, c, angle, scale)
         stage.target[motor] = wanted_d

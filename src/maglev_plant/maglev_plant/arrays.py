@@ -14,6 +14,7 @@ from maglev_model.commutation import SCALES
 from maglev_model.machine import Machine, machine_constants
 from maglev_model.machine_array import MachineArray
 from maglev_model.records import Record
+from maglev_plant.effects.arrays import EffectArrays, effect_arrays
 from maglev_plant.parameters import PlantParameters
 
 
@@ -69,6 +70,8 @@ class StageArrays(Record):
     command: Annotated[FloatArray, 8]  # currents [A]
     reading: Annotated[FloatArray, 6]  # gaps of motors 1..4, x, z [m]
 
+    effects: EffectArrays  # of a real stage
+
 
 def true_machine(parameters: PlantParameters) -> Machine:
     """The machine with its offsets applied: the plant as it is, not as the controller knows it."""
@@ -112,9 +115,11 @@ def stage_arrays(parameters: PlantParameters) -> StageArrays:
         **_encoders(parameters),
         **_guides(parameters),
         **_disturbances(parameters, machine),
+        effects=effect_arrays(parameters, machine, parameters.sample_time / parameters.substeps),
     )
     stage.state[::2] = parameters.initial.position
     stage.state[1::2] = np.array(parameters.initial.velocity) * np.logical_not(stage.locked)
+    stage.effects.winding.last[:] = stage.state
     return stage
 
 

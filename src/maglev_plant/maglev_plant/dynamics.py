@@ -14,6 +14,7 @@ from maglev_model.platen import output_accelerations
 from maglev_model.records import Block
 from maglev_plant.amplifier import set_targets
 from maglev_plant.arrays import StageArrays
+from maglev_plant.rough import advance_rough
 from maglev_plant.stops import apply_stops
 
 
@@ -85,6 +86,9 @@ def advance(block: Block) -> None:
     """
     stage: StageArrays = block[0]
     machine = machine_from_array(stage.machine)
+    if stage.effects.moving:
+        advance_rough(stage, machine)
+        return
     set_targets(stage, machine)
     step, end = stage.step, stage.lag_end
     start = stage.sample * (step * stage.substeps)

@@ -10,31 +10,13 @@ import math
 import numpy as np
 
 from maglev_model.compiled import compiled
+from maglev_model.machine import Machine
 from maglev_model.machine_array import machine_from_array
 from maglev_model.records import Block
 from maglev_plant.arrays import StageArrays
-
-_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
-_MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
-_MIX_2 = np.uint64(0x94D049BB133111EB)
-
-
-@compiled
-def _uniform(key: int) -> float:
-    """A number in (0, 1) from an integer, by the finalizer of SplitMix64."""
-    bits = np.uint64(key) * _GOLDEN
-    bits = (bits ^ (bits >> np.uint64(30))) * _MIX_1
-    bits = (bits ^ (bits >> np.uint64(27))) * _MIX_2
-    bits ^= bits >> np.uint64(31)
-    return (float(bits >> np.uint64(11)) + 0.5) / 9007199254740992.0
-
-
-@compiled
-def gaussian(seed: int, sample: int, channel: int) -> float:
-    """A standard normal number that belongs to one seed, sample and channel (0..7)."""
-    key = (seed << 32) ^ (sample * 16 + channel * 2)
-    radius = math.sqrt(-2.0 * math.log(_uniform(key)))
-    return radius * math.cos(2.0 * math.pi * _uniform(key + 1))
+from maglev_plant.effects.modes import add_deflections
+from maglev_plant.effects.sensor import count_lengths, late_by, note_own, read_lengths
+from maglev_plant.random_numbers import gaussian
 
 
 @compiled
@@ -55,10 +37,27 @@ def _read(
 
 
 @compiled
+def _encode_rough(stage: StageArrays, machine: Machine) -> None:
+    """What the encoders of a real stage read."""
+    sensor = stage.effects.sensor
+    output = stage.state[::2].copy()
+    add_deflections(stage.effects.modes, output)
+    read_lengths(sensor, output, np.zeros(5), machine.r, stage.reading)
+    note_own(sensor, stage.reading)
+    late = late_by(sensor, stage.seed, stage.sample)
+    if late != 0.0:
+        read_lengths(sensor, output, late * stage.state[1::2], machine.r, stage.reading)
+    count_lengths(sensor, stage.seed, stage.sample, stage.reading)
+
+
+@compiled
 def encode(block: Block) -> None:
     """Write what the encoders read now into ``reading`` of a stage's block."""
     stage: StageArrays = block[0]
     machine = machine_from_array(stage.machine)
+    if stage.effects.sensor.on:
+        _encode_rough(stage, machine)
+        return
     state, reading = stage.state, stage.reading
     y = state[0]
     tilt_phi = machine.r * math.sin(state[6])

@@ -10,6 +10,7 @@ from maglev_model.axes import AXES
 from maglev_model.guide import GuideParameters
 from maglev_model.machine import MachineParameters
 from maglev_model.parameters import ParameterError, group, parameter
+from maglev_plant.effects.parameters import EffectParameters
 
 _BY_AXIS = ', by axis y, x, z, phi, theta'
 
@@ -177,7 +178,7 @@ class PlantParameters:
 
     sample_time: float = parameter(1e-3, 'time between samples', unit='s', within=(1e-4, 1e-2))
     substeps: int = parameter(2, 'Runge-Kutta steps of fourth order per sample', within=(1, 1000))
-    seed: int = parameter(0, 'seed of the encoder noise', within=(0, 2**31 - 1))
+    seed: int = parameter(0, 'seed of noise and of what is drawn', within=(0, 2**31 - 1))
     watchdog: float = parameter(
         0.05,
         'without fresh currents for this long in flight they are cut',
@@ -192,6 +193,7 @@ class PlantParameters:
     disturbance: DisturbanceParameters = group(DisturbanceParameters)
     offset: OffsetParameters = group(OffsetParameters)
     initial: InitialParameters = group(InitialParameters)
+    effects: EffectParameters = group(EffectParameters)
 
     def __post_init__(self) -> None:
         """Refuse a start outside the stops and steps too long for the friction."""
@@ -224,8 +226,9 @@ class PlantParameters:
 
     def _check_substeps(self) -> None:
         guide = self.guide
+        smooth = self.effects.friction.model == 'tanh'
         friction = zip(guide.coulomb, guide.coulomb_velocity, guide.viscous, strict=True)
-        rates = [coulomb / velocity + viscous for coulomb, velocity, viscous in friction]
+        rates = [smooth * coulomb / velocity + viscous for coulomb, velocity, viscous in friction]
         needed = math.ceil(max(rates) * self.sample_time / _LONGEST_STEP)
         if self.substeps < needed:
             raise ParameterError(

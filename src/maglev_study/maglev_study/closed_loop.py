@@ -13,6 +13,7 @@ from maglev_controller.regulator import MeasurementFault, Regulator
 from maglev_controller.sample_step import FIRST_FAULT, control_step
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
+from maglev_model.geometry import motor_gaps, outputs_of_gaps
 from maglev_model.records import Block
 from maglev_plant.arrays import StageArrays
 from maglev_plant.dynamics import advance
@@ -26,15 +27,20 @@ from maglev_study.references import References
 class Run:
     """What happened in n samples of the closed loop; row k is sample k.
 
-    ``state`` (n, 10) true x1..x10 when the sample was taken; ``direct_current``,
-    ``quadrature_current`` (n, 4) commanded in answer [A]; ``limited_by`` (n,) what limited them, as
-    bits of :mod:`maglev_model.inverse`.
+    ``state`` (n, 10) true x1..x10 when the sample was taken; ``reading`` (n, 6) what the encoders
+    read, gaps of motors 1..4, x, z [m], and ``own_length`` (n, 6) what these lengths are on their
+    own scales, between the counts; ``direct_current``, ``quadrature_current`` (n, 4) commanded
+    in answer [A]; ``limited_by`` (n,) what limited them, as bits of :mod:`maglev_model.inverse`;
+    ``radius`` r of (5) [m].
     """
 
     state: FloatArray
+    reading: FloatArray
+    own_length: FloatArray
     direct_current: FloatArray
     quadrature_current: FloatArray
     limited_by: NDArray[np.int8]
+    radius: float
 
     @property
     def saturated(self) -> NDArray[np.bool_]:
@@ -46,6 +52,20 @@ class Run:
         """The true outputs y, x, z, phi, theta (n, 5) [m, rad]."""
         return self.state[:, ::2]
 
+    @property
+    def measured(self) -> FloatArray:
+        """The same as the encoders have them (n, 5) [m, rad]."""
+        return _outputs(self.reading, self.radius)
+
+    @property
+    def own(self) -> FloatArray:
+        """The same on the encoders' own scales, zeros and all, between the counts (n, 5)."""
+        return _outputs(self.own_length, self.radius)
+
+
+def _outputs(length: FloatArray, radius: float) -> FloatArray:
+    return outputs_of_gaps(length[:, :4], length[:, 4], length[:, 5], radius)
+
 
 @compiled
 def _loop(
@@ -55,6 +75,8 @@ def _loop(
     velocity: FloatArray,
     acceleration: FloatArray,
     state: FloatArray,
+    reading: FloatArray,
+    own: FloatArray,
     current: FloatArray,
     code: NDArray[np.int8],
     delayed: bool,
@@ -65,6 +87,9 @@ def _loop(
     for k in range(position.shape[0]):
         state[k] = stage.state
         encode(block)
+        reading[k] = stage.reading
+        if stage.effects.sensor.on:
+            own[k] = stage.effects.sensor.own
         code[k] = control_step(
             control,
             Reading(stage.reading[:4], stage.reading[4], stage.reading[5]),
@@ -104,6 +129,7 @@ def run(
         if array.shape != (n, 5):
             raise ValueError(f'{name} must have shape ({n}, 5), not {array.shape}')
     state, current = np.empty((n, 10)), np.empty((n, 8))
+    reading, own = np.empty((n, 6)), np.empty((n, 6))
     code = np.zeros(n, dtype=np.int8)
     arrays = stage.arrays
     done = _loop(
@@ -113,6 +139,8 @@ def run(
         velocity,
         acceleration,
         state,
+        reading,
+        own,
         current,
         code,
         delayed,
@@ -120,7 +148,11 @@ def run(
     if done < n:
         gap, x, z = arrays.reading[:4], float(arrays.reading[4]), float(arrays.reading[5])
         raise MeasurementFault(f'sample {done}: {regulator.describe(int(code[done]), gap, x, z)}')
-    return Run(state, current[:, :4], current[:, 4:], code)
+    radius = stage.parameters.machine.radius
+    if not arrays.effects.sensor.on:
+        own[:, :4] = motor_gaps(state[:, ::2], radius)
+        own[:, 4:] = state[:, 2:5:2]
+    return Run(state, reading, own, current[:, :4], current[:, 4:], code, radius)
 
 
 def warm_up() -> None:

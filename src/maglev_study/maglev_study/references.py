@@ -82,3 +82,25 @@ def _growing_ellipse(time: FloatArray, theta: float, grow: float) -> References:
         rate * sine + scale * cosine,
         bend * sine + 2.0 * rate * cosine - scale * omega**2 * sine,
     )
+
+
+def scan(way: FloatArray, speed: FloatArray, passes: int, period: float) -> References:
+    """To and fro about 25 mm at constant speed, from one end, ``passes`` times each way.
+
+    ``way`` (5,) to each side and ``speed`` (5,), which must take the same time; an axis with no
+    speed stands. In the last fifth of each way the speed turns smoothly.
+    """
+    moving = speed > 0.0
+    half = float(np.max(2.0 * way[moving] / speed[moving]))
+    n = round(half / period)
+    share = np.arange(n) / n
+    turn = np.clip(np.minimum(share, 1.0 - share) / 0.1, 0.0, 1.0)
+    profile, slope, _ = minimum_jerk(turn)
+    slope = slope * np.where(share < 0.5, 1.0, -1.0) * (turn < 1.0) / 0.1
+    profile, slope = profile / profile.mean(), slope / profile.mean()
+    place = np.concatenate([[0.0], np.cumsum(profile)[:-1]]) / n
+    there = np.stack([place, profile / half, slope / half**2])
+    back = np.stack([1.0 - place, -profile / half, -slope / half**2])
+    course = np.concatenate([there, back] * passes, axis=1)[:, :, None] * (2.0 * way * moving)
+    start = HOVER - way * moving
+    return References(start + course[0], course[1], course[2])

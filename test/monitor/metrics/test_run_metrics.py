@@ -59,6 +59,7 @@ def test_tracking_errors(run: Any, records: dict[str, Records]) -> None:
         assert row['mean_abs_error'] == pytest.approx(np.abs(error[:, index]).mean(), rel=1e-12)
         assert row['rms_error'] == pytest.approx(np.sqrt((error[:, index] ** 2).mean()), rel=1e-12)
         assert row['max_abs_error'] == np.abs(error[:, index]).max()
+        assert row['bias'] == pytest.approx(error[:, index].mean(), rel=1e-9, abs=1e-18)
     assert found['error_source'] == 'true'
     assert found['verdict'] == 'pass'
     assert found['samples'] == np.count_nonzero(np.isin(run.phase, (Phase.TRACK, Phase.STEP)))
@@ -71,8 +72,12 @@ def test_without_the_true_state_errors_are_of_the_measured_position(
     true = figures(records)
     records['measurement'] = records['measurement'].copy()
     records['measurement']['gap'] += 1e-3
+    both = figures(records)
+    assert both['axes'] == true['axes']
     del records['plant']
     found = figures(records)
+    assert both['measured_axes'] == found['measured_axes'] == found['axes']
+    assert found['axes']['y']['bias'] == pytest.approx(true['axes']['y']['bias'] + 1e-3, rel=1e-6)
     error = (run.position[:, 0] + 1e-3 - run.reference[:, 0])[run.phase == Phase.TRACK]
     assert found['error_source'] == 'measured'
     assert found['axes']['y']['mean_abs_error'] == pytest.approx(np.abs(error).mean(), rel=1e-9)
@@ -431,5 +436,6 @@ def test_a_mean_error_that_was_not_measured_does_not_pass(records: dict[str, Rec
         'mean_abs_error': None,
         'rms_error': None,
         'max_abs_error': None,
+        'bias': None,
     }
     assert found['verdict'] == 'fail'

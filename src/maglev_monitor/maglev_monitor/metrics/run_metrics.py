@@ -134,6 +134,7 @@ class RunMetrics:
             **self._missing_result(),
             'error_source': SOURCES[source],
             'axes': self._tracking.result(source),
+            'measured_axes': self._tracking.result(1),
             'steps': [entry for step in self._steps for entry in step.results(source)],
             'currents': self._currents.result(),
             'timing': self._timing.result(sample_time),
@@ -215,11 +216,12 @@ class RunMetrics:
 
 
 class _Tracking:
-    """Mean, rms and largest |e| by source and axis."""
+    """Mean, rms and largest |e|, and the mean of e, by source and axis."""
 
     def __init__(self) -> None:
         self._count = np.zeros(2, np.int64)
         self._sum = np.zeros((2, 5))
+        self._signed = np.zeros((2, 5))
         self._squares = np.zeros((2, 5))
         self._max = np.zeros((2, 5))
 
@@ -232,6 +234,7 @@ class _Tracking:
             magnitude = np.abs(known)
             self._count[source] += len(known)
             self._sum[source] += magnitude.sum(axis=0)
+            self._signed[source] += known.sum(axis=0)
             self._squares[source] += np.square(known).sum(axis=0)
             self._max[source] = np.maximum(self._max[source], magnitude.max(axis=0))
 
@@ -245,6 +248,7 @@ class _Tracking:
                 if count
                 else None,
                 'max_abs_error': _known(self._max[source, index]) if count else None,
+                'bias': _known(self._signed[source, index] / count) if count else None,
             }
         return by_axis
 

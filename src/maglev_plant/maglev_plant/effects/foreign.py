@@ -1,0 +1,130 @@
+"""Models of friction, motor and sensor from outside the package, one small function each.
+
+A parameter names a module by its dotted path; its function is compiled and called by address, so
+the stage's own code is compiled once, whatever model it meets. The functions, plain Python that
+Numba compiles:
+
+- ``force(velocity, level, step, memory)``: friction [N, N m] that resists in the next ``step`` [s],
+  of a guide that slides at ``velocity`` with the level F(v) there. ``memory``, four floats that
+  begin with 0, is the guide's own.
+- ``forces(gap, i_d, i_q, out)``: F_V and F_H of a motor [N] into ``out`` (2,), as (1), (2) have
+  them: F_V positive where it widens the gap.
+- ``reading(length, channel, sample, memory)``: what encoder ``channel`` (0..5) reads of a length
+  [m]; ``memory`` as above.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import numba
+from numba import carray, types
+from numba.core.cgutils import ir
+from numba.extending import intrinsic
+
+from maglev_model.parameters import ParameterError
+from maglev_model.plugins import find_plugin
+
+_MEMORY = 4
+_kept: dict[str, Any] = {}
+"""Compiled models, which must live as long as their addresses are called."""
+
+
+def _caller(result: Any, *arguments: Any) -> Any:
+    """An intrinsic that calls what lies at an address; a ``uintp`` argument is a pointer."""
+
+    def build(typing_context: Any, address: Any, *given: Any) -> Any:
+        signature = result(types.int64, *arguments)
+
+        def generate(context: Any, builder: Any, _signature: Any, values: Any) -> Any:
+            where, *rest = values
+            native = [
+                builder.inttoptr(value, ir.DoubleType().as_pointer())
+                if kind == types.uintp
+                else value
+                for kind, value in zip(arguments, rest, strict=True)
+            ]
+            back = ir.VoidType() if result == types.void else ir.DoubleType()
+            function = ir.FunctionType(back, [value.type for value in native])
+            called = builder.call(builder.inttoptr(where, function.as_pointer()), native)
+            return context.get_dummy_value() if result == types.void else called
+
+        return signature, generate
+
+    return build
+
+
+@intrinsic
+def call_friction(context, address, velocity, level, step, memory):  # type: ignore[no-untyped-def]
+    """``force(velocity, level, step, memory)`` at ``address``."""
+    build = _caller(types.float64, types.float64, types.float64, types.float64, types.uintp)
+    return build(context, address, velocity, level, step, memory)
+
+
+@intrinsic
+def call_motor(context, address, gap, i_d, i_q, out):  # type: ignore[no-untyped-def]
+    """``forces(gap, i_d, i_q, out)`` at ``address``."""
+    build = _caller(types.void, types.float64, types.float64, types.float64, types.uintp)
+    return build(context, address, gap, i_d, i_q, out)
+
+
+@intrinsic
+def call_sensor(context, address, length, channel, sample, memory):  # type: ignore[no-untyped-def]
+    """``reading(length, channel, sample, memory)`` at ``address``."""
+    build = _caller(types.float64, types.float64, types.int64, types.int64, types.uintp)
+    return build(context, address, length, channel, sample, memory)
+
+
+def friction_address(name: str) -> int:
+    """Address of the ``force`` of a module; raises ParameterError."""
+
+    def made(force: Any) -> Any:
+        @numba.cfunc('float64(float64, float64, float64, CPointer(float64))')
+        def call(velocity, level, step, memory):  # type: ignore[no-untyped-def]
+            return force(velocity, level, step, carray(memory, _MEMORY))
+
+        return call
+
+    return _address('effects.friction.model', name, 'force', made)
+
+
+def motor_address(name: str) -> int:
+    """Address of the ``forces`` of a module; raises ParameterError."""
+
+    def made(forces: Any) -> Any:
+        @numba.cfunc('void(float64, float64, float64, CPointer(float64))')
+        def call(gap, i_d, i_q, out):  # type: ignore[no-untyped-def]
+            forces(gap, i_d, i_q, carray(out, 2))
+
+        return call
+
+    return _address('effects.motor.model', name, 'forces', made)
+
+
+def sensor_address(name: str) -> int:
+    """Address of the ``reading`` of a module; raises ParameterError."""
+
+    def made(reading: Any) -> Any:
+        @numba.cfunc('float64(float64, int64, int64, CPointer(float64))')
+        def call(length, channel, sample, memory):  # type: ignore[no-untyped-def]
+            return reading(length, channel, sample, carray(memory, _MEMORY))
+
+        return call
+
+    return _address('effects.sensor.model', name, 'reading', made)
+
+
+@functools.cache
+def _address(parameter: str, name: str, function: str, make: Callable[[Any], Any]) -> int:
+    module = find_plugin(parameter, name, (function,))
+    try:
+        compiled = make(numba.njit(getattr(module, function)))
+    except numba.core.errors.NumbaError as error:
+        reason = str(error).strip().splitlines()[-1]
+        raise ParameterError(
+            f"parameter '{parameter}' is '{name}', whose '{function}' cannot be compiled: {reason}"
+        ) from error
+    _kept[f'{name}.{function}'] = compiled
+    return int(compiled.address)

@@ -1,0 +1,142 @@
+"""Two laws on a rough plant: the ellipse, slow scans, holds; true and measured errors apart.
+
+An internal model hides on an ellipse what repeats with position; slow scans and holds show it.
+``python benchmarks/rough.py`` prints what is found here.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from maglev_controller.parameters import ControllerParameters
+from maglev_controller.regulator import MeasurementFault, Regulator
+from maglev_model.axes import FloatArray
+from maglev_model.parameters import from_yaml, replace
+from maglev_plant.parameters import PlantParameters
+from maglev_plant.simulation import SimulatedStage
+from maglev_study.closed_loop import Run, run
+from maglev_study.references import HOVER, References, ellipse, held, joined, scan, shaped
+
+THETA = 0.010
+"""Amplitude of the ellipse in 4DOF [rad]."""
+
+SPEEDS = (0.001, 0.002, 0.005)
+"""Of the slow scans [m/s]."""
+
+HUNTING = np.array([3e-6, 3e-6, 3e-6, 15e-6, 15e-6])
+"""Rms movement about its mean from which on a hold is said to hunt [m, rad]."""
+
+_SETTLE, _RUN_IN = 3.0, 10.0  # [s]
+_SCAN_WAY = np.array([0.001, 0.005, 0.005, 0.0, 0.0])  # to each side [m, rad]
+_SCAN_SHARE = np.array([0.2, 1.0, 1.0, 0.0, 0.0])  # of the speed
+_SPAN = np.array([0.003, 0.02, 0.02, 0.001, 0.006])  # places of holds, to each side
+_LOST = 2e-3  # error with which a platen is lost [m, rad]
+
+
+@dataclasses.dataclass(frozen=True)
+class Errors:
+    """Errors of one source, each (5,) by axis y, x, z, phi, theta [m, rad]."""
+
+    mean: FloatArray  # of |e|
+    peak: FloatArray  # of |e|
+    bias: FloatArray  # mean of e
+    movement: FloatArray  # rms of e about its mean
+
+    @classmethod
+    def of(cls, error: FloatArray) -> Errors:
+        """Of errors (n, 5)."""
+        size = np.abs(error)
+        return cls(size.mean(axis=0), size.max(axis=0), error.mean(axis=0), error.std(axis=0))
+
+
+@dataclasses.dataclass(frozen=True)
+class Outcome:
+    """A flight: what it is called, errors by source, or why there are none."""
+
+    name: str
+    true: Errors | None = None
+    own: Errors | None = None  # of the position on the encoders' own scales
+    measured: Errors | None = None
+    lost: str = ''
+
+    @property
+    def hunting(self) -> bool:
+        """Whether the true position moves more than a hold should."""
+        return self.true is not None and bool(np.any(self.true.movement > HUNTING))
+
+
+@dataclasses.dataclass(frozen=True)
+class Experiment:
+    """A reference from rest at 25 mm; errors count in the last ``measured`` seconds."""
+
+    name: str
+    references: References
+    measured: float
+
+
+def experiments(period: float, hold: float = 60.0, places: int = 3) -> Iterator[Experiment]:
+    """The ellipse in 4DOF, scans at 1 to 5 mm/s and holds, a sample every ``period`` [s]."""
+    course = ellipse(_RUN_IN + 20.0, THETA, period, grow=2.0)
+    yield Experiment('ellipse', course, 20.0)
+    for speed in SPEEDS:
+        moving = scan(_SCAN_WAY, speed * _SCAN_SHARE, 2, period)
+        start = shaped(HOVER, moving.position[0], 0.5, _SETTLE, period)
+        name = f'scan {1e3 * speed:g} mm/s'
+        yield Experiment(name, joined(start, moving), period * len(moving.position))
+    rng = np.random.default_rng(5)
+    for number in range(1, places + 1):
+        goal = HOVER + _SPAN * rng.uniform(-1.0, 1.0, 5)
+        course = joined(shaped(HOVER, goal, 1.0, _SETTLE, period), held(goal, hold, period))
+        yield Experiment(f'hold {number}', course, hold)
+
+
+@functools.lru_cache(maxsize=8)
+def _designed(parameters: ControllerParameters) -> Regulator:
+    return Regulator(parameters)
+
+
+def fly_rough(
+    plant: PlantParameters, controller: ControllerParameters, experiment: Experiment
+) -> Outcome:
+    """One flight of a law on a plant, begun at rest at 25 mm."""
+    stage = SimulatedStage(replace(plant, {'initial.position': tuple(HOVER)}))
+    regulator = _designed(controller)
+    regulator.reset()
+    try:
+        outcome = run(regulator, stage, experiment.references)
+    except MeasurementFault as fault:
+        return Outcome(experiment.name, lost=str(fault))
+    return judged(experiment, outcome, plant.sample_time)
+
+
+def judged(experiment: Experiment, outcome: Run, period: float) -> Outcome:
+    """What a run of an experiment amounts to."""
+    n = round(experiment.measured / period)
+    wanted = experiment.references.position
+    sources = (outcome.output, outcome.own, outcome.measured)
+    true, own, measured = (position[-n:] - wanted[-n:] for position in sources)
+    far = np.flatnonzero(np.abs(true).max(axis=1) > _LOST)
+    if far.size:
+        return Outcome(experiment.name, lost=f'2 mm or 2 mrad off at {period * far[0]:.3f} s')
+    return Outcome(experiment.name, Errors.of(true), Errors.of(own), Errors.of(measured))
+
+
+def laws(params: Path) -> dict[str, ControllerParameters]:
+    """The default law, and the paper's on the exact inverse, from the folder of parameters."""
+    files = [params / name for name in ('controller.yaml', 'paper.yaml', 'paper_exact.yaml')]
+    return {
+        'default law': from_yaml(ControllerParameters, 'controller', files[0]),
+        "paper's law": from_yaml(ControllerParameters, 'controller', *files),
+    }
+
+
+def plant_of(params: Path, *overlays: str, **overrides: object) -> PlantParameters:
+    """The benchmark plant with overlays by name; single parameters with dots as ``__``."""
+    files = [params / f'{name}.yaml' for name in ('machine', 'benchmark', *overlays)]
+    named: Mapping[str, object] = {k.replace('__', '.'): v for k, v in overrides.items()}
+    return replace(from_yaml(PlantParameters, 'plant', *files), named)
