@@ -6,10 +6,13 @@ The defaults are the best regulator there is here; ``params/paper.yaml`` turns i
 from __future__ import annotations
 
 import dataclasses
+import math
 
+from maglev_controller.design.notch import MOST
+from maglev_controller.design.state_space import Mode
 from maglev_model.loop_parameters import AxisLoopParameters, FundamentalParameters
 from maglev_model.machine import MachineParameters
-from maglev_model.parameters import group, parameter
+from maglev_model.parameters import ParameterError, group, parameter
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -149,6 +152,69 @@ class EncoderParameters:
         'nearest',
         'whole counts are the nearest, or the next below: then half a count is added',
         choices=('nearest', 'floor'),
+    )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class ModeParameters:
+    """Flexible modes the feedback has to bear, as many as the lists are long.
+
+    The encoders read the platen + gain q, q'' + 2 damping w q' + w^2 q = the axis' acceleration.
+    """
+
+    axis: tuple[str, ...] = parameter(
+        ('x',), 'axis of each mode', choices=('y', 'x', 'z', 'phi', 'theta')
+    )
+    frequency: tuple[float, ...] = parameter((120.0,), 'of each mode', unit='Hz', within=(1.0, 1e4))
+    damping: tuple[float, ...] = parameter((0.01,), 'damping ratio of each', within=(1e-4, 1.0))
+    gain: tuple[float, ...] = parameter(
+        (0.0,), 'modal gain of each by that of the rigid axis; 0: none', within=(-2.0, 2.0)
+    )
+    tolerance: float = parameter(
+        0.05, 'how far off, of themselves, the frequencies may be', within=(0.0, 0.3)
+    )
+    sensitivity: float = parameter(
+        2.5, 'sensitivity peak that the design goes for, wherever the modes are', within=(1.2, 1e3)
+    )
+
+    def __post_init__(self) -> None:
+        """Refuse lists of different lengths, and more modes of an axis than it has notches."""
+        lengths = len(self.axis), len(self.frequency), len(self.damping), len(self.gain)
+        if len(set(lengths)) > 1:
+            raise ParameterError(
+                "parameters 'axis', 'frequency', 'damping' and 'gain' of the modes have "
+                '{}, {}, {} and {} elements, they must have as many'.format(*lengths)
+            )
+        for name in set(self.axis):
+            if len(self.of(name)) > MOST:
+                raise ParameterError(
+                    f"parameter 'axis' names {len(self.of(name))} modes of {name}, "
+                    f'an axis has at most {MOST}'
+                )
+
+    def of(self, axis: str) -> tuple[Mode, ...]:
+        """The modes of one axis that have a gain."""
+        given = zip(self.axis, self.frequency, self.damping, self.gain, strict=True)
+        return tuple(
+            Mode(2.0 * math.pi * frequency, damping, gain)
+            for name, frequency, damping, gain in given
+            if name == axis and gain != 0.0
+        )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class WindingParameters:
+    """The windings and the rail: what currents can be asked for from sample to sample."""
+
+    voltage: float = parameter(
+        0.0, 'that an amplifier can put out at most; 0: any', unit='V', within=(0.0, 1e4)
+    )
+    resistance: float = parameter(4.0, 'of a phase', unit='ohm', within=(0.0, 1e3))
+    inductance: float = parameter(
+        45e-3,
+        'of a phase where the gap is gap_max; nearer it grows as K_v3 wants it',
+        unit='H',
+        within=(1e-4, 10.0),
     )
 
 
@@ -326,6 +392,8 @@ class ControllerParameters:
     derivative: DerivativeParameters = group(DerivativeParameters)
     encoder: EncoderParameters = group(EncoderParameters)
     friction: FrictionParameters = group(FrictionParameters)
+    modes: ModeParameters = group(ModeParameters)
+    winding: WindingParameters = group(WindingParameters)
     y: AxisParameters = group(AxisParameters)
     x: AxisParameters = group(AxisParameters)
     z: AxisParameters = group(AxisParameters)

@@ -40,6 +40,7 @@ from maglev_controller.sample_step import (
     WARPED,
     answer_sample,
 )
+from maglev_controller.voltage import winding_settings
 from maglev_model.axes import AXES, FloatArray
 from maglev_model.machine import machine_constants
 from maglev_model.machine_array import machine_to_array
@@ -204,10 +205,17 @@ def _control_arrays(
     records = np.zeros(1, RECORDS)
     settings = _settings(parameters, designs)
     for name in SETTINGS.fields or ():
-        records['settings'][name] = settings[name]
+        if name in settings:
+            records['settings'][name] = settings[name]
+    for name, value in winding_settings(parameters).items():
+        records['settings']['winding'][name] = value
     models, transition = np.zeros((5, states), MODEL), np.zeros((5, states, states))
     for index, design in enumerate(designs):
         n = design.order
+        number = len(design.notches)
+        records['settings']['notches'][0, index] = number
+        if number:
+            records['settings']['notch'][0, index, :number] = design.notches
         models['output'][index, :n] = design.gain[2:]
         models['drive'][index, :n] = design.drive
         models['antiwindup'][index, :n] = design.antiwindup

@@ -22,11 +22,13 @@ from maglev_controller.control_arrays import (
 )
 from maglev_controller.estimation import observe, predict, surprises
 from maglev_controller.friction import friction_ahead, learn_friction
+from maglev_controller.notch_filter import notched
 from maglev_controller.rest import note_motion, shares
+from maglev_controller.voltage import keep_within_voltage
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
 from maglev_model.equilibrium import equilibrium_inverse
-from maglev_model.inverse import CurrentLimits, exact_inverse, simplified_inverse
+from maglev_model.inverse import CURRENT, CurrentLimits, exact_inverse, simplified_inverse
 from maglev_model.machine import Machine
 from maglev_model.machine_array import machine_from_array
 from maglev_model.platen import outputs_from_gaps
@@ -155,7 +157,8 @@ def _virtual_input(
     axis.error = error
     axis.bump *= settings.fade
     feedback = settings.error_gain[index] * error + settings.rate_gain[index] * error_rate
-    w = feedback + sample.internal_model[index] + axis.bump
+    filtered = notched(settings, axis, index, feedback + sample.internal_model[index])
+    w = filtered + axis.bump
     sample.error[index] = measured - position
     sample.error_rate[index] = error_rate
     ahead = to_acceleration + settings.feed_forward * acceleration
@@ -269,10 +272,13 @@ def control_step(
             reference.velocity[index],
             reference.acceleration[index],
         )
-    limited_by = _currents(settings, machine, sample, currents.direct, currents.quadrature)
+    direct, quadrature = currents.direct, currents.quadrature
+    limited_by = _currents(settings, machine, sample, direct, quadrature)
+    if limited_by == 0:
+        sample.realised[:] = sample.virtual_input
+    if keep_within_voltage(settings, machine, sample, records.axes, direct, quadrature):
+        limited_by |= CURRENT
     for index in range(5):
-        if limited_by == 0:
-            sample.realised[index] = sample.virtual_input[index]
         if settings.observed[index]:
             predict(settings, records.axes[index], sample.realised[index])
         learn_friction(settings, records.axes[index], index, sample.realised[index])
