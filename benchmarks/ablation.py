@@ -45,8 +45,7 @@ def slower(factor: float) -> dict[str, object]:
     """All three numbers of every axis by a factor; margins are not what this is about."""
     numbers = {'bandwidth': 200.0, 'integration': 90.0, 'learning': 10.0}
     scaled = {name: factor * value for name, value in numbers.items()}
-    free = {'margins.override': True, 'internal_model.friction_slope': 0.0}
-    return {**on_all_axes(**scaled), **free}
+    return {**on_all_axes(**scaled), 'margins.override': True}
 
 
 ROWS: tuple[tuple[str, Values, Values], ...] = (
@@ -56,6 +55,8 @@ ROWS: tuple[tuple[str, Values, Values], ...] = (
     ('an eighth', slower(0.125), {}),
     ('internal model: integrator alone', on_all_axes(multiples=(0.0,)), {}),
     ('internal model: integrator and fundamental', on_all_axes(multiples=(0.0, 1.0)), {}),
+    ('without friction fed forward', {'friction.adaptation_time': 0.0}, {}),
+    ('oscillators hold at rest', {'internal_model.rest': 'hold'}, {}),
     ('without feed-forward', {'feed_forward': False}, {}),
     ('derivative filter in place of the observer', {'rate_estimate': 'derivative'}, {}),
     ('plant without friction', {}, NO_FRICTION),

@@ -33,6 +33,10 @@ SCENARIOS = (
 MATCHED = ('circle', 'helix', 'lissajous', 'waypoints', 'square')
 
 
+WITHOUT_FRICTION_AHEAD = {'friction.adaptation_time': 0.0}
+"""What is expected is the error without, so it is an upper bound with it."""
+
+
 def tables(*names, **overrides):
     """Reference and controller parameters from overlays of params/."""
     paths = [PARAMS / f'{name}.yaml' for name in names]
@@ -40,7 +44,8 @@ def tables(*names, **overrides):
     changes = {name.replace('__', '.'): value for name, value in overrides.items()}
     if reference.trajectory == 'file':
         changes['file.path'] = str(PARAMS / 'figure_of_eight.csv')
-    return replace(reference, changes), from_yaml(ControllerParameters, 'controller', *paths)
+    controller = from_yaml(ControllerParameters, 'controller', *paths)
+    return replace(reference, changes), replace(controller, WITHOUT_FRICTION_AHEAD)
 
 
 def tracked(reference, controller):
@@ -156,7 +161,9 @@ def test_the_compliance_is_the_closed_loops(frequency):
     count = 12000
     still = References(np.tile(HOVER, (count, 1)), np.zeros((count, 5)), np.zeros((count, 5)))
     outcome = run(
-        Regulator(ControllerParameters()), SimulatedStage(build(PlantParameters, plant)), still
+        Regulator(build(ControllerParameters, {'internal_model.rest': 'hold'})),
+        SimulatedStage(build(PlantParameters, plant)),
+        still,
     )
     error = outcome.output[-6000:, 1]
     table = ReferenceParameters()

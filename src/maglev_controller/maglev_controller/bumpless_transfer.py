@@ -66,6 +66,7 @@ def carry_over(old: ControlArrays, new: ControlArrays, maps: ModelMaps) -> None:
             _translate_rate(new, axis)
         new.xi[axis] = maps[axis] @ old.xi[axis]
         new.axes['bump'][axis] += _wanted(old, axis) - _wanted(new, axis)
+        _settle_notches(new, axis)
 
 
 def _wanted(arrays: ControlArrays, axis: int) -> float:
@@ -75,7 +76,19 @@ def _wanted(arrays: ControlArrays, axis: int) -> float:
     rate = arrays.sample['error_rate'][axis]
     ahead = float(settings['feed_forward'] * state['reference_acceleration'])
     feedback = settings['error_gain'][axis] * state['error'] + settings['rate_gain'][axis] * rate
-    return float(feedback) + model_part + ahead
+    friction = state['friction'] * state['bristle'] if settings['friction_gain'] > 0.0 else 0.0
+    return float(feedback) + model_part + ahead + float(friction)
+
+
+def _settle_notches(arrays: ControlArrays, axis: int) -> None:
+    """Notches as they are after the last sample's feedback has been held for long."""
+    settings, state = arrays.settings, arrays.axes[axis]
+    rate = arrays.sample['error_rate'][axis]
+    value = settings['error_gain'][axis] * state['error'] + settings['rate_gain'][axis] * rate
+    value += float(arrays.models['output'][axis] @ arrays.xi[axis])
+    for k in range(int(settings['notches'][axis])):
+        b_0, _, b_2, _, a_2 = settings['notch'][axis, k]
+        state['notch'][k] = (1.0 - b_0) * value, (b_2 - a_2) * value
 
 
 def _translate_rate(new: ControlArrays, axis: int) -> None:

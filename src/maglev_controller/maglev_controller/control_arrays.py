@@ -11,15 +11,31 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from maglev_controller.design.notch import MOST
 from maglev_model.axes import FloatArray
 from maglev_model.machine import Machine
 
 Record = Any
 """An element of an array of records, whose fields compiled code reads and writes as attributes."""
 
+INTERVALS: Final = 64
+"""Of the gaps between which the inductance is interpolated."""
+
 INVERSES: Final = ('simplified', 'exact', 'equilibrium')
 SIMPLIFIED: Final = 0
 EXACT: Final = 1
+
+WINDING: Final = np.dtype(
+    [
+        ('limits', '?'),  # whether the rail's voltage limits currents
+        ('voltage', 'f8'),  # [V]
+        ('resistance', 'f8'),  # [ohm]
+        ('least_gap', 'f8'),  # of the table [m]
+        ('spacing', 'f8'),  # [m]
+        ('inductance', 'f8', INTERVALS + 1),  # of a phase, by gap [H]
+    ],
+    align=True,
+)
 
 SETTINGS: Final = np.dtype(
     [
@@ -49,6 +65,18 @@ SETTINGS: Final = np.dtype(
         ('late', '?'),  # whether the currents come a sample late, and the observer predicts it
         ('paper_antiwindup', '?'),
         ('fade', 'f8'),  # what is left of a bump a sample later
+        ('rest_fades', '?'),  # whether oscillators fade where the reference rests
+        ('waking', 'f8'),  # share of the way that this goes in a sample
+        ('doubt', 'f8'),  # share of a difference within the count that is not believed at rest
+        ('half_gap', 'f8'),  # half a count of the gaps' encoders [m]
+        ('half_horizontal', 'f8'),  # of those of x and z
+        ('floored', '?'),  # whether counts are rounded down
+        ('notches', 'i8', 5),  # how many
+        ('notch', 'f8', (5, MOST, 5)),  # their coefficients, as of Notch
+        ('winding', WINDING),
+        ('friction_gain', 'f8'),  # share of what is missing that is learned in a sample, 0: none
+        ('friction_way', 'f8', 5),  # [m, rad]
+        ('friction_limit', 'f8', 5),  # [m/s², rad/s²]
     ],
     align=True,
 )
@@ -71,6 +99,14 @@ AXIS: Final = np.dtype(
         ('estimated_velocity', 'f8'),
         ('pending_acceleration', 'f8'),  # commanded, and yet to act where the currents come late
         ('error', 'f8'),  # of the last sample, as w used it
+        ('rested', 'f8'),  # how long the reference has been at rest [s]
+        ('awake', 'f8'),  # 1 where the reference moves, 0 where it rests, and between them
+        ('surprise', 'f8'),  # what the encoders read beyond the prediction
+        ('wanted_acceleration', 'f8'),  # of the reference with jumps made good
+        ('bristle', 'f8'),  # friction's shape, -1 to 1, in the direction of motion
+        ('friction', 'f8'),  # its level as learned [m/s², rad/s²]
+        ('load', 'f8'),  # what else acts against the motion, likewise
+        ('notch', 'f8', (MOST, 2)),  # states of the notches
         ('bump', 'f8'),  # part of w that fades, so that w does not jump when gains change
     ],
     align=True,
@@ -86,6 +122,7 @@ SAMPLE: Final = np.dtype(
         ('internal_model', 'f8', 5),  # its part of w
         ('learned_error', 'f8', 5),
         ('realised', 'f8', 5),  # accelerations that the currents give
+        ('asked', 'f8', 8),  # currents, i_d of motors 1..4, then i_q [A]
         ('excess', 'f8', 2),  # sat(u) - u of u_x and u_z [A]
     ],
     align=True,
@@ -97,8 +134,11 @@ RECORDS: Final = np.dtype(
 """All of these in one: what is constant, what is remembered of an axis (but for ξ), what the last
 sample came to. Python hands over one array faster than three."""
 
-MODEL: Final = np.dtype([('output', 'f8'), ('drive', 'f8'), ('antiwindup', 'f8')], align=True)
-"""What belongs to one state of an internal model: elements of κ (Γ included), N_d and E_d."""
+MODEL: Final = np.dtype(
+    [('output', 'f8'), ('drive', 'f8'), ('antiwindup', 'f8'), ('oscillates', '?')], align=True
+)
+"""What belongs to one state of an internal model: elements of κ (Γ included), N_d and E_d, and
+whether it is an oscillator's that fades at rest."""
 
 
 class ControlArrays(NamedTuple):

@@ -29,8 +29,10 @@ from maglev_controller.control_arrays import (
 from maglev_controller.design.axis_design import AxisDesign
 from maglev_controller.design.margins import LoopMargins, all_margins, check_margins
 from maglev_controller.design.observer import NO_OBSERVER
+from maglev_controller.estimation import DOUBT
 from maglev_controller.laws import control_law
-from maglev_controller.parameters import ControllerParameters
+from maglev_controller.parameters import ControllerParameters, EncoderParameters
+from maglev_controller.rest import FADING_TIME as REST_FADING_TIME
 from maglev_controller.sample_step import (
     BAD_REFERENCE,
     FIRST_FAULT,
@@ -38,6 +40,7 @@ from maglev_controller.sample_step import (
     WARPED,
     answer_sample,
 )
+from maglev_controller.voltage import winding_settings
 from maglev_model.axes import AXES, FloatArray
 from maglev_model.machine import machine_constants
 from maglev_model.machine_array import machine_to_array
@@ -202,13 +205,22 @@ def _control_arrays(
     records = np.zeros(1, RECORDS)
     settings = _settings(parameters, designs)
     for name in SETTINGS.fields or ():
-        records['settings'][name] = settings[name]
+        if name in settings:
+            records['settings'][name] = settings[name]
+    for name, value in winding_settings(parameters).items():
+        records['settings']['winding'][name] = value
     models, transition = np.zeros((5, states), MODEL), np.zeros((5, states, states))
     for index, design in enumerate(designs):
         n = design.order
+        number = len(design.notches)
+        records['settings']['notches'][0, index] = number
+        if number:
+            records['settings']['notch'][0, index, :number] = design.notches
         models['output'][index, :n] = design.gain[2:]
         models['drive'][index, :n] = design.drive
         models['antiwindup'][index, :n] = design.antiwindup
+        if design.fades and design.model is not None:
+            models['oscillates'][index, :n] = design.model.oscillating
         transition[index, :n, :n] = design.transition
     return ControlArrays(
         records=records,
@@ -255,4 +267,27 @@ def _settings(
         'late': parameters.input_delay > 0,
         'paper_antiwindup': parameters.internal_model.antiwindup == 'paper',
         'fade': math.exp(-parameters.sample_time / FADING_TIME),
+        'rest_fades': any(design.fades for design in designs),
+        'doubt': DOUBT if any(design.fades for design in designs) else 0.0,
+        'waking': -math.expm1(-parameters.sample_time / REST_FADING_TIME),
+        **_counts(parameters.encoder),
+        **_friction(parameters),
+    }
+
+
+def _counts(encoder: EncoderParameters) -> dict[str, ArrayLike]:
+    return {
+        'half_gap': 0.5 * encoder.gap_resolution,
+        'half_horizontal': 0.5 * encoder.horizontal_resolution,
+        'floored': encoder.rounding == 'floor',
+    }
+
+
+def _friction(parameters: ControllerParameters) -> dict[str, ArrayLike]:
+    friction = parameters.friction
+    time = friction.adaptation_time
+    return {
+        'friction_gain': -math.expm1(-parameters.sample_time / time) if time > 0.0 else 0.0,
+        'friction_way': friction.way,
+        'friction_limit': friction.largest,
     }

@@ -20,10 +20,22 @@ from maglev_controller.control_arrays import (
     Record,
     Reference,
 )
+from maglev_controller.estimation import observe, predict, surprises
+from maglev_controller.friction import friction_ahead, learn_friction
+from maglev_controller.notch_filter import notched
+from maglev_controller.rest import note_motion, shares
+from maglev_controller.voltage import keep_within_voltage
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
 from maglev_model.equilibrium import equilibrium_inverse
-from maglev_model.inverse import Answer, CurrentLimits, clip, exact_inverse, simplified_inverse
+from maglev_model.inverse import (
+    CURRENT,
+    Answer,
+    CurrentLimits,
+    clip,
+    exact_inverse,
+    simplified_inverse,
+)
 from maglev_model.machine import Machine
 from maglev_model.machine_array import machine_from_array
 from maglev_model.platen import outputs_from_gaps
@@ -97,31 +109,6 @@ def _follow_jump(
 
 
 @compiled
-def _observe(settings: Record, axis: Record, index: int, measured: float) -> tuple[float, float]:
-    """Position and velocity when w acts: the prediction, corrected with what is measured."""
-    surprise = measured - axis.estimated_position
-    axis.estimated_position += settings.observer_position[index] * surprise
-    axis.estimated_velocity += settings.observer_velocity[index] * surprise
-    position, velocity = axis.estimated_position, axis.estimated_velocity
-    if settings.late:
-        period, acceleration = settings.period, axis.pending_acceleration
-        position += period * (velocity + 0.5 * period * acceleration)
-        velocity += period * acceleration
-    return position, velocity
-
-
-@compiled
-def _predict(settings: Record, axis: Record, realised: float) -> None:
-    """Carry the estimate over to the next sample, its input known."""
-    acceleration = realised
-    if settings.late:
-        acceleration, axis.pending_acceleration = axis.pending_acceleration, realised
-    period = settings.period
-    axis.estimated_position += period * (axis.estimated_velocity + 0.5 * period * acceleration)
-    axis.estimated_velocity += period * acceleration
-
-
-@compiled
 def _model_parts(control: ControlArrays, sample: Record) -> None:
     """What the internal models of all axes add to w: κ ξ."""
     for index in range(5):
@@ -147,7 +134,8 @@ def _virtual_input(
     if fresh:
         axis.fresh, axis.filtered_position = False, measured
         axis.estimated_position, axis.estimated_velocity = measured, 0.0
-        axis.pending_acceleration = 0.0
+        axis.pending_acceleration, axis.surprise = 0.0, 0.0
+        axis.reference_position = position
         jump = position - measured
     else:
         mean = 0.5 * (velocity + axis.reference_velocity)
@@ -158,13 +146,15 @@ def _virtual_input(
     if not fresh:
         middle = 0.5 * (smooth_velocity + axis.smooth_velocity)
         axis.filtered_velocity += forget * (middle - axis.filtered_velocity)
+    note_motion(settings, axis, position, smooth_velocity)
     axis.reference_position, axis.reference_velocity = position, velocity
     axis.reference_acceleration = acceleration
     axis.smooth_velocity = smooth_velocity
+    axis.wanted_acceleration = to_acceleration + acceleration
     error = measured - position - to_position
     sample.learned_error[index] = clip(error, settings.learned_error[index])
     if settings.observed[index]:
-        seen, seen_velocity = _observe(settings, axis, index, measured)
+        seen, seen_velocity = observe(settings, axis, index)
         error, error_rate = seen - position - to_position, seen_velocity - smooth_velocity
     else:
         change = measured - axis.filtered_position
@@ -174,10 +164,12 @@ def _virtual_input(
     axis.error = error
     axis.bump *= settings.fade
     feedback = settings.error_gain[index] * error + settings.rate_gain[index] * error_rate
-    w = feedback + sample.internal_model[index] + axis.bump
+    filtered = notched(settings, axis, index, feedback + sample.internal_model[index])
+    w = filtered + axis.bump
     sample.error[index] = measured - position
     sample.error_rate[index] = error_rate
-    sample.virtual_input[index] = w + to_acceleration + settings.feed_forward * acceleration
+    ahead = to_acceleration + settings.feed_forward * acceleration
+    sample.virtual_input[index] = w + ahead + friction_ahead(settings, axis, index)
 
 
 @compiled
@@ -209,17 +201,21 @@ def _lost(settings: Record, sample: Record, index: int) -> float:
 def _advance_models(control: ControlArrays, settings: Record, sample: Record) -> None:
     """ξ⁺ = Φ_d ξ + N_d e + E_d (what was realised less what was wanted), (14), (17)."""
     models, transition, xi = control.models, control.transition, control.xi
+    axes = control.records[0].axes
     states = xi.shape[1]
     following = np.empty(states)
     for index in range(5):
         if settings.controlled[index] == 0.0:
             continue
         error, lost = sample.learned_error[index], _lost(settings, sample, index)
+        learned, kept = shares(settings, axes[index])
         for row in range(states):
-            value = models[index, row].drive * error + models[index, row].antiwindup * lost
+            oscillates = models[index, row].oscillates
+            told = learned * error if oscillates else error
+            value = models[index, row].drive * told + models[index, row].antiwindup * lost
             for column in range(states):
                 value += transition[index, row, column] * xi[index, column]
-            following[row] = value
+            following[row] = kept * value if oscillates else value
         for row in range(states):
             xi[index, row] = following[row]
 
@@ -234,6 +230,10 @@ def control_step(
     machine = machine_from_array(settings.machine)
     output = sample.output
     warp = outputs_from_gaps(machine, reading.gap, reading.x, reading.z, output)
+    if settings.floored:
+        output[0] += settings.half_gap
+        output[1] += settings.half_horizontal
+        output[2] += settings.half_horizontal
     code = _check(settings, output, warp, reference)
     if code != OK:
         for motor in range(4):
@@ -241,6 +241,7 @@ def control_step(
             currents.quadrature[motor] = 0.0
         return code
     _model_parts(control, sample)
+    surprises(settings, machine, records.axes, reading)
     for index in range(5):
         sample.position[index] = output[index]
         _virtual_input(
@@ -252,12 +253,16 @@ def control_step(
             reference.velocity[index],
             reference.acceleration[index],
         )
-    limited_by = _currents(settings, machine, sample, currents.direct, currents.quadrature)
+    direct, quadrature = currents.direct, currents.quadrature
+    limited_by = _currents(settings, machine, sample, direct, quadrature)
+    if limited_by == 0:
+        sample.realised[:] = sample.virtual_input
+    if keep_within_voltage(settings, machine, sample, records.axes, direct, quadrature):
+        limited_by |= CURRENT
     for index in range(5):
-        if limited_by == 0:
-            sample.realised[index] = sample.virtual_input[index]
         if settings.observed[index]:
-            _predict(settings, records.axes[index], sample.realised[index])
+            predict(settings, records.axes[index], sample.realised[index])
+        learn_friction(settings, records.axes[index], index, sample.realised[index])
     _advance_models(control, settings, sample)
     return limited_by
 

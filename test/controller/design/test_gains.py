@@ -143,7 +143,7 @@ def test_the_default_gain_is_python_controls() -> None:
     integrator, oscillators = fourth * own.integration**2, fourth * own.learning**2
     cost = np.diag([fourth, 2.0 * own.bandwidth**2, integrator] + [oscillators] * 10)
     wanted = -control.dlqr(state, drive[:, None], cost, np.eye(1))[0][0]
-    untouched = design_axis(axis_parameters(internal_model__friction_slope=0.0), 'y')
+    untouched = design_axis(axis_parameters(internal_model__rest='hold'), 'y')
     np.testing.assert_allclose(feedback(untouched), wanted, rtol=1e-4, atol=10.0)
     np.testing.assert_allclose(feedback(design)[:3], wanted[:3], rtol=1e-5)
 
@@ -169,12 +169,11 @@ def test_bandwidth_is_where_the_poles_are(bandwidth: float) -> None:
     np.testing.assert_allclose(poles, -bandwidth, rtol=1e-6)
 
 
-@pytest.mark.parametrize('slope', [300.0, 1500.0, 1e9])
-def test_split_phase_turns_every_oscillator_half_the_way(slope: float) -> None:
-    """By the residue at its pole, against the axis' answer with and without the friction."""
+def test_split_phase_turns_every_oscillator_half_the_way() -> None:
+    """By the residue at its pole, against the axis' answer without friction and with very steep."""
     model = internal_model([0.0, OMEGA, 3.0 * OMEGA], 'modal')
     gain = dlqr(model, Weights(1e8, 2e4, (1e12, 1e10), 1.0), PERIOD)
-    turned = split_phase(model, gain, slope)
+    turned = split_phase(model, gain)
     np.testing.assert_array_equal(turned[:3], gain[:3])
     for omega in model.frequencies[1:]:
         near = (1j * omega + 1e-6) * np.eye(5) - model.state
@@ -182,7 +181,7 @@ def test_split_phase_turns_every_oscillator_half_the_way(slope: float) -> None:
         before, after = ((k[2:] + model.output) @ modes for k in (gain, turned))
         moving, standing = (
             1.0 / (-gain[0] - omega**2 + 1j * omega * (friction - gain[1]))
-            for friction in (0.0, slope)
+            for friction in (0.0, 1e12)
         )
         turn = np.angle(after / before)
         assert turn == pytest.approx(0.5 * np.angle(moving / standing), abs=1e-4)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
 from maglev_controller.design.derivative import DerivativeFilter
 from maglev_controller.design.internal_model import InternalModel
+from maglev_controller.design.notch import Notch, notch_system
 from maglev_controller.design.observer import NO_OBSERVER, Observer
 from maglev_controller.design.state_space import StateSpace
 from maglev_model.axes import FloatArray
@@ -24,9 +26,9 @@ class AxisDesign:
     = α e + w that it is designed for: 0 where the inverse takes all of it away.
 
     ``limits_errors``: large errors are fed back and learned from only as far as the parameters
-    ``limits.error`` and ``internal_model.largest_error`` say. ``can_hunt``: with friction at rest
-    it may hunt, which is looked into. ``model`` is the internal model that ξ is the state of, where
-    it is one.
+    ``limits.error`` and ``internal_model.largest_error`` say. ``fades``: where the reference rests,
+    oscillators fade. ``notches`` filter w but for what is fed forward. ``model`` is the internal
+    model that ξ is the state of, where it is one.
     """
 
     gain: FloatArray
@@ -37,7 +39,8 @@ class AxisDesign:
     observer: Observer = NO_OBSERVER
     stiffness: float = 0.0
     limits_errors: bool = False
-    can_hunt: bool = False
+    fades: bool = False
+    notches: tuple[Notch, ...] = ()
     model: InternalModel | None = None
 
     @property
@@ -46,8 +49,38 @@ class AxisDesign:
         return int(self.drive.size)
 
 
-def controller_system(design: AxisDesign, period: float, delay: int) -> StateSpace:
-    """e to w as ``control_step`` computes it; ``delay`` is what the observer predicts over.
+def resting(design: AxisDesign, doubt: float) -> AxisDesign:
+    """What is left of a design that fades where the reference has rested for long.
+
+    That is the integrator of the internal model alone, and an observer that believes counts less by
+    ``doubt``, 0 to 1.
+    """
+    assert design.model is not None
+    kept = ~design.model.oscillating
+    states = np.concatenate(([True, True], kept))
+    believed = (1.0 - doubt) * np.array(design.observer)
+    return dataclasses.replace(
+        design,
+        gain=design.gain[states],
+        transition=design.transition[np.ix_(kept, kept)],
+        drive=design.drive[kept],
+        antiwindup=design.antiwindup[kept],
+        observer=Observer(*believed.tolist()),
+    )
+
+
+class FeedbackSystem(NamedTuple):
+    """x⁺ = A x + B_e e + B_w w, v = C x + D e: the error and what of w acts make the feedback."""
+
+    state: FloatArray
+    error_input: FloatArray
+    acting_input: FloatArray
+    output: FloatArray
+    direct: float
+
+
+def feedback_system(design: AxisDesign, period: float, delay: int) -> FeedbackSystem:
+    """The feedback before its notches; ``delay`` is what the observer predicts over.
 
     State (ξ, f) with the derivative filter; (ξ, predicted position and rate) with the observer, and
     the w still to act with a delay.
@@ -57,9 +90,10 @@ def controller_system(design: AxisDesign, period: float, delay: int) -> StateSpa
         rate, forget = design.derivative
         state = np.zeros((n + 1, n + 1))
         state[:n, :n], state[n, n] = design.transition, 1.0 - forget
-        return StateSpace(
+        return FeedbackSystem(
             state,
             np.append(design.drive, forget),
+            np.zeros(n + 1),
             np.append(gain[2:], -gain[1] * rate),
             float(gain[0] + gain[1] * rate),
         )
@@ -75,14 +109,31 @@ def controller_system(design: AxisDesign, period: float, delay: int) -> StateSpa
         used, used_read = after, after_read
     output, direct = gain[:2] @ used, float(gain[:2] @ used_read)
     output[:n] += gain[2:]
-    state, drive = np.zeros((size, size)), np.zeros(size)
+    state, drive, acting = np.zeros((size, size)), np.zeros(size), np.zeros(size)
     state[:n, :n], drive[:n] = design.transition, design.drive
     state[n : n + 2], drive[n : n + 2] = after, after_read
     if delay:
-        state[n + 2], drive[n + 2] = output, direct
+        acting[n + 2] = 1.0
     else:
-        state[n : n + 2] += np.outer(push, output)
-        drive[n : n + 2] += push * direct
+        acting[n : n + 2] = push
+    return FeedbackSystem(state, drive, acting, output, direct)
+
+
+def controller_system(design: AxisDesign, period: float, delay: int) -> StateSpace:
+    """e to w as ``control_step`` computes it, notches last: states of feedback, then of notches."""
+    inner = feedback_system(design, period, delay)
+    filters = notch_system(design.notches)
+    n = inner.error_input.size
+    size = n + filters.input.size
+    state, drive, output = np.zeros((size, size)), np.zeros(size), np.zeros(size)
+    output[:n], output[n:] = filters.direct * inner.output, filters.output
+    direct = filters.direct * inner.direct
+    state[:n, :n], drive[:n] = inner.state, inner.error_input
+    state[n:, :n] = np.outer(filters.input, inner.output)
+    state[n:, n:] = filters.state
+    drive[n:] = filters.input * inner.direct
+    state[:n] += np.outer(inner.acting_input, output)
+    drive[:n] += inner.acting_input * direct
     return StateSpace(state, drive, output, direct)
 
 

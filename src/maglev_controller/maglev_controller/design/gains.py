@@ -160,21 +160,21 @@ def dlqr(model: InternalModel, weights: Weights, period: float, axis: str = 'axi
     return np.asarray(-(row @ state) / (effort[0, 0] + row @ drive))
 
 
-def split_phase(model: InternalModel, gain: FloatArray, slope: float) -> FloatArray:
-    """K (n + 2,) with every oscillator turned half-way to where friction at rest wants it.
+def split_phase(model: InternalModel, gain: FloatArray) -> FloatArray:
+    """K (n + 2,) with every oscillator turned half-way to where the steepest friction wants it.
 
-    Around standstill friction is as good as viscous, with a large slope: it delays the answer of
-    the axis at an oscillator's ω from the angle of 1 / (k_p − ω² + i ω k_d), which the LQR gains
-    count on, towards −90°. An oscillator is damped by its loop as long as it is less than 90° off,
-    so with gains for the one it is left undamped at the other, and platen and oscillator hunt. Half
-    the difference, for friction of ``slope`` [1/s], serves both.
+    Where the platen moves slowly friction is as good as viscous, with a large slope: it delays the
+    answer of the axis at an oscillator's ω from the angle of 1 / (k_p − ω² + i ω k_d), which the
+    LQR gains count on, towards −90°. An oscillator is damped by its loop as long as it is less than
+    90° off, so with gains for the one it is left undamped at the other, and platen and oscillator
+    hunt. Half-way between no friction and infinitely steep friction it is at most 45° off for any.
     """
     turned: FloatArray = gain.copy()
     for index, omega in enumerate(model.frequencies):
         if omega == 0.0:
             continue
         moving = -gain[0] - omega**2 - 1j * omega * gain[1]
-        turn = 0.5 * np.angle((moving + 1j * omega * slope) / moving)
+        turn = 0.5 * np.angle(1j / moving)
         rows = np.nonzero(model.mode == index)[0]
         first, second = gain[2 + rows] + model.output[rows]
         turned[2 + rows] = (

@@ -40,6 +40,11 @@ class InternalModel:
         """Number of states n."""
         return int(self.state.shape[0])
 
+    @property
+    def oscillating(self) -> NDArray[np.bool_]:
+        """Which of the states (n,) belong to an oscillator (modal form)."""
+        return np.asarray(self.frequencies[self.mode] > 0.0)
+
     def polynomial(self) -> FloatArray:
         """The characteristic polynomial d(s), (n + 1,), highest power first."""
         return polynomial(self.frequencies)

@@ -13,20 +13,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from maglev_controller.design.axis_design import AxisDesign, controller_system
+from maglev_controller.design.axis_design import AxisDesign, controller_system, resting
+from maglev_controller.design.modes import variants
 from maglev_controller.design.state_space import (
     ComplexArray,
-    StateSpace,
+    Mode,
     closed_loop,
     plant_system,
     response,
 )
+from maglev_controller.estimation import DOUBT
 from maglev_controller.parameters import ControllerParameters, MarginParameters
-from maglev_model.axes import FloatArray
+from maglev_model.axes import AXES, FloatArray
 from maglev_model.parameters import ParameterError
 
 _GRID = 1500  # frequencies looked at
-_SLOPES = 24  # slopes of friction looked at
+_SLOPES = tuple(np.geomspace(1.0, 1e6, 25))  # of friction against velocity [1/s]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,9 +37,11 @@ class LoopMargins:
 
     ``poles`` (m,) of the sampled closed loop, z; ``crossover`` [rad/s], the highest; ``phase``
     margin [deg], the smallest at any crossover; gain margins as factors, ``gain_up`` (inf for
-    none) and ``gain_down`` (0 for none); ``sensitivity``, the peak of |1 / (1 + L)|;
-    ``friction_slope`` [1/s] up to which friction at rest leaves the loop stable, at most the
-    ``wanted_slope``, the steepest that was looked at.
+    none) and ``gain_down`` (0 for none); ``sensitivity``, the peak of |1 / (1 + L)|; ``friction``,
+    the least slope against velocity [1/s] with which the loop hunts where the reference rests: inf
+    for none, nan where oscillators hold and it is not looked at. With ``modes``, all is the worst
+    wherever they are within the ``tolerance``; ``unstable_mode`` [rad/s] is one that alone makes
+    the loop unstable, or nan.
     """
 
     poles: ComplexArray
@@ -47,8 +51,10 @@ class LoopMargins:
     gain_up: float
     gain_down: float
     sensitivity: float
-    friction_slope: float
-    wanted_slope: float
+    friction: float
+    modes: tuple[Mode, ...] = ()
+    tolerance: float = 0.0
+    unstable_mode: float = math.nan
 
     @property
     def spectral_radius(self) -> float:
@@ -65,8 +71,14 @@ class LoopMargins:
     def text(self, axis: str) -> str:
         """One line for the log."""
         friction = ''
-        if self.friction_slope > 0.0:
-            friction = f', at rest stable with friction up to {self.friction_slope:.0f} 1/s'
+        if self.friction == math.inf:
+            friction = ', at rest stable with any friction'
+        elif self.friction > 0.0:
+            friction = f', at rest stable with friction flatter than {self.friction:.3g} 1/s'
+        for mode in self.modes:
+            friction += f', with a mode at {mode.frequency / (2.0 * math.pi):.4g} Hz'
+        if self.modes:
+            friction += f' ± {100.0 * self.tolerance:g} %'
         poles = ' '.join(_pole_text(pole) for pole in self.natural_poles)
         return (
             f'{axis}: crossover {self.crossover:.0f} rad/s, phase margin {self.phase:.1f} deg, '
@@ -84,16 +96,24 @@ def _decibel(factor: float) -> str:
 
 
 def loop_margins(
-    design: AxisDesign, period: float, *, delay: int = 0, designed: int = 0, slope: float = 0.0
+    design: AxisDesign,
+    period: float,
+    *,
+    delay: int = 0,
+    designed: int = 0,
+    modes: Sequence[Mode] = (),
 ) -> LoopMargins:
     """Poles and margins of one axis at sample time ``period`` [s].
 
     ``delay`` [samples] is what the currents come late, ``designed`` what the controller was
-    designed for; ``slope`` [1/s], when above 0, is the friction up to which standing is looked at.
+    designed for; ``modes`` flexible ones of the plant.
     """
     controller = controller_system(design, period, designed)
-    plant = plant_system(period, delay, stiffness=design.stiffness)
+    plant = plant_system(period, delay, stiffness=design.stiffness, modes=modes)
     omega = np.geomspace(0.05, math.pi / period * (1.0 - 1e-9), _GRID)
+    for mode in modes:
+        near = mode.frequency * (1.0 + mode.damping * np.linspace(-5.0, 5.0, 101))
+        omega = np.union1d(omega, near[near < omega[-1]])
     z = np.exp(1j * omega * period)
     loop = -response(controller, z) * response(plant, z)
     crossover, phase = _crossover(omega, loop)
@@ -106,8 +126,7 @@ def loop_margins(
         gain_up=up,
         gain_down=down,
         sensitivity=float(np.max(1.0 / np.abs(1.0 + loop))),
-        friction_slope=_friction(controller, design, (period, delay), slope),
-        wanted_slope=slope,
+        friction=_friction(design, period, delay, designed) if design.fades else math.nan,
     )
 
 
@@ -134,45 +153,77 @@ def _gain_margins(loop: ComplexArray) -> tuple[float, float]:
     return float(np.min(up, initial=math.inf)), float(np.max(down, initial=0.0))
 
 
-def _friction(
-    controller: StateSpace, design: AxisDesign, timing: tuple[float, int], slope: float
-) -> float:
-    """The slope up to which every slope leaves the loop stable; ``timing``: sample time, delay."""
-    reached = 0.0
-    if slope <= 0.0:
-        return reached
-    period, delay = timing
-    for friction in np.geomspace(slope / 100.0, slope, _SLOPES):
-        plant = plant_system(period, delay, stiffness=design.stiffness, friction=friction)
-        if np.max(np.abs(np.linalg.eigvals(closed_loop(controller, plant)))) >= 1.0:
-            break
-        reached = float(friction)
-    return reached
+def _friction(design: AxisDesign, period: float, delay: int, designed: int) -> float:
+    """The least slope of friction, of those looked at, with which the loop hunts at rest, or inf.
+
+    Whether the observer believes the counts or doubts them.
+    """
+    controllers = [
+        controller_system(resting(design, doubt), period, designed) for doubt in (0.0, DOUBT)
+    ]
+    for slope in _SLOPES:
+        plant = plant_system(period, delay, stiffness=design.stiffness, friction=slope)
+        loops = [closed_loop(controller, plant) for controller in controllers]
+        if max(np.max(np.abs(np.linalg.eigvals(loop))) for loop in loops) >= 1.0:
+            return float(slope)
+    return math.inf
 
 
 def all_margins(
     parameters: ControllerParameters, designs: Sequence[AxisDesign]
 ) -> tuple[LoopMargins, ...]:
     """The margins of all axes; of axes designed alike only once."""
-    slope, delay = parameters.internal_model.friction_slope, parameters.input_delay
     known: dict[object, LoopMargins] = {}
-    keys = [_key(design) for design in designs]
-    for key, design in zip(keys, designs, strict=True):
+    given = [parameters.modes.of(axis) for axis in AXES]
+    keys = [(_key(design), modes) for design, modes in zip(designs, given, strict=True)]
+    for key, design, modes in zip(keys, designs, given, strict=True):
         if key not in known:
-            known[key] = loop_margins(
-                design,
-                parameters.sample_time,
-                delay=delay,
-                designed=delay,
-                slope=slope if design.can_hunt else 0.0,
-            )
+            known[key] = _worst(parameters, design, modes)
     return tuple(known[key] for key in keys)
+
+
+def _worst(
+    parameters: ControllerParameters, design: AxisDesign, modes: tuple[Mode, ...]
+) -> LoopMargins:
+    """The margins as they are at least, wherever the modes are."""
+    delay, tolerance = parameters.input_delay, parameters.modes.tolerance
+    each = [
+        loop_margins(design, parameters.sample_time, delay=delay, designed=delay, modes=variant)
+        for variant in variants(modes, tolerance)
+    ]
+    worst = max(each, key=lambda margins: margins.spectral_radius)
+    return dataclasses.replace(
+        worst,
+        phase=min(margins.phase for margins in each),
+        gain_up=min(margins.gain_up for margins in each),
+        gain_down=max(margins.gain_down for margins in each),
+        sensitivity=max(margins.sensitivity for margins in each),
+        modes=modes,
+        tolerance=tolerance,
+        unstable_mode=_unstable_mode(parameters, design, modes),
+    )
+
+
+def _unstable_mode(
+    parameters: ControllerParameters, design: AxisDesign, modes: tuple[Mode, ...]
+) -> float:
+    """Frequency [rad/s] of the first mode that alone makes the loop unstable, or nan."""
+    period, delay = parameters.sample_time, parameters.input_delay
+    controller = controller_system(design, period, delay)
+    for mode in modes:
+        for variant in variants((mode,), parameters.modes.tolerance):
+            plant = plant_system(period, delay, stiffness=design.stiffness, modes=variant)
+            loop = closed_loop(controller, plant)
+            if variant and np.max(np.abs(np.linalg.eigvals(loop))) >= 1.0:
+                return mode.frequency
+    return math.nan
 
 
 def _key(design: AxisDesign) -> object:
     """All that the margins depend on."""
     arrays = tuple(array.tobytes() for array in (design.gain, design.transition, design.drive))
-    return arrays, design.derivative, design.observer, design.stiffness, design.can_hunt
+    estimate = design.derivative, design.observer
+    return arrays, design.notches, estimate, design.stiffness, design.fades
 
 
 def check_margins(parameters: ControllerParameters, margins: LoopMargins, axis: str) -> None:
@@ -180,6 +231,12 @@ def check_margins(parameters: ControllerParameters, margins: LoopMargins, axis: 
 
     Raises :class:`ParameterError`, naming the axis, the figure and what would help.
     """
+    if math.isfinite(margins.unstable_mode):
+        raise ParameterError(
+            f'{axis}: the flexible mode at {margins.unstable_mode / (2.0 * math.pi):.4g} Hz makes '
+            'the loop unstable, and no notch and speed of the axis were found that bear it: make '
+            "the axis slower, or the mode better known ('modes.tolerance')"
+        )
     if not margins.spectral_radius < 1.0:
         worst = margins.poles[np.argmax(np.abs(margins.poles))]
         raise ParameterError(
@@ -195,12 +252,11 @@ def check_margins(parameters: ControllerParameters, margins: LoopMargins, axis: 
             f'{axis}: {short}; make the axis slower (its bandwidth, LQR weights or poles), '
             "or take it as it is with 'margins.override'"
         )
-    slope = margins.wanted_slope
-    if margins.friction_slope < 0.999 * slope:
+    if margins.friction < math.inf:
         raise ParameterError(
-            f'{axis}: standing still hunts with friction steeper than {margins.friction_slope:.0f} '
-            f"1/s, 'internal_model.friction_slope' asks for {slope:g}; make the axis faster or its "
-            'internal model slower (its learning or weight_model), or ask for less'
+            f'{axis}: standing still hunts with friction of a slope of {margins.friction:.3g} 1/s; '
+            'make the axis faster or its integrator slower (its integration or weight_model), or '
+            "set 'internal_model.rest' to 'hold'"
         )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -59,25 +60,45 @@ def response(system: StateSpace, z: ComplexArray) -> ComplexArray:
     return np.asarray(columns[:, :, 0] @ system.output + system.direct)
 
 
+class Mode(NamedTuple):
+    """A flexible mode: the encoder reads κ q more, q̈ + 2 ζ ω q̇ + ω² q = w."""
+
+    frequency: float  # ω [rad/s]
+    damping: float  # ζ
+    gain: float  # κ, by the rigid axis' gain
+
+
 def plant_system(
-    period: float, delay: int = 0, *, stiffness: float = 0.0, friction: float = 0.0
+    period: float,
+    delay: int = 0,
+    *,
+    stiffness: float = 0.0,
+    friction: float = 0.0,
+    modes: Sequence[Mode] = (),
 ) -> StateSpace:
     """What the inverse leaves of an axis, sampled with w held and ``delay`` samples late: w to e.
 
-    ë = α e − κ ė + w with ``stiffness`` α [1/s²] and ``friction`` κ [1/s].
+    ë = α e − κ ė + w with ``stiffness`` α [1/s²] and ``friction`` κ [1/s], and flexible modes
+    beside it.
     """
-    moved, pushed = discretise(
-        np.array([[0.0, 1.0], [stiffness, -friction]]), np.array([[0.0], [1.0]]), period
-    )
-    size = 2 + delay
-    state, drive = np.zeros((size, size)), np.zeros(size)
-    state[:2, :2] = moved
+    body = 2 + 2 * len(modes)
+    continuous, read = np.zeros((body, body)), np.eye(1, body)[0]
+    continuous[:2, :2] = [[0.0, 1.0], [stiffness, -friction]]
+    for row, mode in zip(range(2, body, 2), modes, strict=True):
+        damping = 2.0 * mode.damping * mode.frequency
+        continuous[row : row + 2, row : row + 2] = [[0.0, 1.0], [-(mode.frequency**2), -damping]]
+        read[row] = mode.gain
+    pushed = np.tile([[0.0], [1.0]], (1 + len(modes), 1))
+    moved, pushed = discretise(continuous, pushed, period)
+    size = body + delay
+    state, drive, output = np.zeros((size, size)), np.zeros(size), np.zeros(size)
+    state[:body, :body], output[:body] = moved, read
     if delay == 0:
         drive[:] = pushed[:, 0]
     else:
-        state[:2, 2], drive[-1] = pushed[:, 0], 1.0
-        state[2:-1, 3:] = np.eye(delay - 1)
-    return StateSpace(state, drive, np.eye(1, size)[0], 0.0)
+        state[:body, body], drive[-1] = pushed[:, 0], 1.0
+        state[body:-1, body + 1 :] = np.eye(delay - 1)
+    return StateSpace(state, drive, output, 0.0)
 
 
 def closed_loop(controller: StateSpace, plant: StateSpace) -> FloatArray:

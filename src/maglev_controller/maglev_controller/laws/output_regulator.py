@@ -6,6 +6,8 @@ be tracked or rejected. ``params/paper.yaml`` makes it the paper's to the letter
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
 from maglev_controller.checks import check_inverse
@@ -21,6 +23,7 @@ from maglev_controller.design.gains import (
     split_phase,
 )
 from maglev_controller.design.internal_model import InternalModel, internal_model
+from maglev_controller.design.modes import Case, stabilised
 from maglev_controller.design.observer import NO_OBSERVER, observer
 from maglev_controller.design.state_space import discretise
 from maglev_controller.parameters import AxisParameters, ControllerParameters
@@ -34,17 +37,38 @@ def check(parameters: ControllerParameters) -> None:
 
 
 def design(parameters: ControllerParameters, axis: str) -> AxisDesign:
-    """Gains from poles or weights, for the internal model of the axis.
+    """Gains from poles or weights, for the internal model of the axis, and notches for its modes.
 
-    Raises :class:`ParameterError`, naming the axis and the reason, for a choice that has no
-    stabilising gain.
+    Modes make the axis slower where its gains come from speeds. Raises :class:`ParameterError`,
+    naming the axis and the reason, for a choice that has no stabilising gain.
     """
     chosen: AxisParameters = getattr(parameters, axis)
+
+    def build(factor: float) -> AxisDesign:
+        slower = {
+            name: factor * getattr(chosen, name)
+            for name in ('bandwidth', 'integration', 'learning')
+        }
+        return _design(parameters, dataclasses.replace(chosen, **slower), axis)
+
+    given = parameters.modes
+    case = Case(
+        given.of(axis),
+        given.tolerance,
+        parameters.sample_time,
+        parameters.input_delay,
+        given.sensitivity,
+    )
+    return stabilised(build, case)
+
+
+def _design(parameters: ControllerParameters, chosen: AxisParameters, axis: str) -> AxisDesign:
     shared, period = parameters.internal_model, parameters.sample_time
     model = _model(parameters, axis)
     gain = _gain(chosen, model, period, axis)
-    if shared.friction_slope > 0.0 and chosen.design != 'poles' and model.form == 'modal':
-        gain = split_phase(model, gain, shared.friction_slope)
+    fades = shared.rest == 'fade' and model.form == 'modal'
+    if fades and chosen.design != 'poles':
+        gain = split_phase(model, gain)
     gain[2:] += model.output
     inputs = np.stack([model.input, _paper_antiwindup(chosen, model, axis)], axis=1)
     transition, driven = discretise(model.state, inputs, period)
@@ -64,7 +88,7 @@ def design(parameters: ControllerParameters, axis: str) -> AxisDesign:
         ),
         observer=observer(parameters.observer.bandwidth, period) if watched else NO_OBSERVER,
         limits_errors=True,
-        can_hunt=True,
+        fades=fades,
         model=model,
     )
 
