@@ -27,5 +27,5 @@ _complete_scenario() { # SCRIPT WORD PREVIOUS
   mapfile -t -O "${#COMPREPLY[@]}" COMPREPLY < <(compgen -W "$words" -- "$2")
 }
 
-complete -F _complete_scenario {commission,compare,ellipse,ellipse_4dof,paper_tables}.sh \
+complete -F _complete_scenario {commission,compare,ellipse,ellipse_4dof,faults,paper_tables}.sh \
   {single_motor,steps,trajectory}.sh

