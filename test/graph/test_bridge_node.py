@@ -28,7 +28,6 @@ from maglev_node.topics import (
 LOWER_STOP = 0.031
 FILES = {'plant': ('benchmark.yaml',), 'hw_bridge': ('hw_bridge.yaml',)}
 ELLIPSE = 'scenario_ellipse.yaml'
-UNHOMED = ('homing.at_start:=false',)
 
 
 class Life:
@@ -174,10 +173,9 @@ def test_unhomed_it_is_not_activated(nodes: Nodes, observer: Observer) -> None:
 @pytest.mark.parametrize(
     ('arguments', 'text'),
     [
-        ([*UNHOMED, 'driver:=quanser', 'mode:=realtime'], 'quanser.com'),
-        ([*UNHOMED, 'driver:=quanser'], 'realtime'),
-        ([*UNHOMED, 'driver:=oscilloscope'], 'one of emulated, quanser'),
-        (['driver:=quanser', 'mode:=realtime'], "'homing.at_start' is true"),
+        (['driver:=quanser', 'mode:=realtime'], 'quanser.com'),
+        (['driver:=quanser'], 'realtime'),
+        (['driver:=oscilloscope'], 'one of emulated, quanser'),
         (['boards.watchdogg:=0.02'], "did you mean 'boards.watchdog'"),
         (['boards.watchdog:=20.0'], 'must lie in'),
     ],
