@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bridge_flight import OMEGA, Flight, ellipse, hover
 
-from maglev_hw_bridge.landing import Landing, impact_of_cut
+from maglev_hw_bridge.landing import Landing, impact_of_cut, impacts_of_cut
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.stage import Mode
 from maglev_model.inverse import CurrentLimits, exact_currents
@@ -100,6 +100,43 @@ def test_a_cut_strikes_the_stop_as_foretold(y: float) -> None:
     assert struck == pytest.approx(foretold, rel=0.12, abs=0.01)
     if y < 0.028:
         assert struck > SOFT  # a cut is no landing
+
+
+@pytest.mark.parametrize(
+    ('y', 'speed', 'stops'),
+    [
+        (0.025, 0.0, ['upper']),
+        (0.0265, 0.0, ['upper']),
+        (0.0265, 0.03, ['upper', 'lower']),
+        (0.0283, 0.0, ['upper', 'lower']),
+        (0.0291, 0.0, ['upper', 'lower']),
+        (0.0308, 0.0, ['lower']),
+        (0.0308, -0.08, ['upper', 'lower']),
+    ],
+)
+def test_near_the_balance_a_cut_may_end_at_either_stop(
+    y: float, speed: float, stops: list[str]
+) -> None:
+    foretold = impacts_of_cut(BridgeParameters(), y, speed)
+    assert list(foretold) == stops
+    assert sorted(foretold.values(), reverse=True) == list(foretold.values())
+
+
+@pytest.mark.parametrize('pull', [0.92, 1.0, 1.08])
+@pytest.mark.parametrize('y', [0.0278, 0.0287, 0.0296])
+def test_a_cut_near_the_balance_is_no_harder_than_foretold(y: float, pull: float) -> None:
+    machine = {'emulation.offset.K_v1': pull, 'emulation.guide.coulomb': [0.0] * 5}
+    flight = fly(hover(y), 400, **machine)
+    foretold = impacts_of_cut(flight.stage.parameters, *flight.rig.state[:2])
+    assert impact_when_cut(flight) <= 1.15 * max(foretold.values()) + 0.03
+
+
+@pytest.mark.parametrize('speed', [np.nan, np.inf, -5.5, -0.75, 0.75])
+def test_a_speed_that_no_platen_has_is_not_foretold(speed: float) -> None:
+    parameters = BridgeParameters()
+    assert impacts_of_cut(parameters, 0.025, speed) == impacts_of_cut(parameters, 0.025, np.nan)
+    assert max(impacts_of_cut(parameters, 0.025, speed).values()) < 0.6
+    assert max(impacts_of_cut(parameters, 0.025, 0.9 * 0.75).values()) > 0.65
 
 
 def test_a_cut_on_the_ellipse_is_far_from_soft() -> None:

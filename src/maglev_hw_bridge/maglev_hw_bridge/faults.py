@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from maglev_hw_bridge import amplifiers, guard
 from maglev_hw_bridge.amplifiers import Amplifiers
 from maglev_hw_bridge.guard import Guard
-from maglev_hw_bridge.landing import impact_of_cut
+from maglev_hw_bridge.landing import impacts_of_cut
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES, PHASE_NAMES
 from maglev_model.axes import AXES
@@ -77,8 +77,9 @@ def overrun_fault(late: float) -> tuple[str, str]:
 def consequence_of_cut(parameters: BridgeParameters, watched: Guard) -> str:
     """What to add to the reason of a fault that cuts the currents in flight."""
     state = watched.arrays
-    speed, stop = impact_of_cut(parameters, state.position[0], state.rate[0])
-    return f'; the platen strikes the {stop} stop at about {speed:.2f} m/s'
+    impacts = impacts_of_cut(parameters, state.position[0], state.rate[0])
+    parts = [f'the {stop} stop at about {speed:.2f} m/s' for stop, speed in impacts.items()]
+    return f'; the platen strikes {" or ".join(parts)}'
 
 
 def remaining_cause(

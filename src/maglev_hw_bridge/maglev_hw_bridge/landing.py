@@ -7,6 +7,7 @@ do: the speed at which the platen then strikes a stop.
 
 from __future__ import annotations
 
+import math
 from typing import Annotated
 
 import numpy as np
@@ -34,6 +35,10 @@ _CARRY = np.array([0.0, -1.0, 1.0, -2.0, 2.0])
 _BRAKING_UPWARD = 0.1  # of y [s]
 _FREE_STEP = 1e-4  # of the motion without current [s]
 _LONGEST_FALL = 10.0  # [s]
+_FASTEST = 0.7  # a free fall from anywhere is slower [m/s]
+_SPEED_UNKNOWN, _SPEED_DOUBT = 0.1, 5e-3  # by how much the rate of y may be off [m/s]
+_PLACE_DOUBT = 2e-4  # and y [m]
+_SHARE_IN_DOUBT = 0.1  # of the magnets' pull and of the rate
 
 
 class LandingArrays(Record):
@@ -157,24 +162,55 @@ class Landing:
 
 @compiled
 def _fall(
-    machine: Machine, y: float, speed: float, upper_stop: float, lower_stop: float
+    machine: Machine, pull: float, y: float, speed: float, upper_stop: float, lower_stop: float
 ) -> tuple[float, float]:
     zero = np.zeros(4)
     time = 0.0
     while upper_stop < y < lower_stop and time < _LONGEST_FALL:
         middle = y + 0.5 * _FREE_STEP * speed
         acceleration = output_accelerations(machine, middle, 0.0, 0.0, zero, zero)[0]
-        speed += _FREE_STEP * acceleration
+        speed += _FREE_STEP * (machine.G + pull * (acceleration - machine.G))
         y += _FREE_STEP * speed
         time += _FREE_STEP
     return y, speed
 
 
-def impact_of_cut(parameters: BridgeParameters, y: float, speed: float) -> tuple[float, str]:
+def impact_of_cut(
+    parameters: BridgeParameters, y: float, speed: float, pull: float = 1.0
+) -> tuple[float, str]:
     """Speed [m/s] at which the platen strikes a stop when currents are cut, and which stop.
 
-    From the air gap ``y`` [m] and its rate [m/s], level, without guide friction.
+    From the air gap ``y`` [m] and its rate [m/s], level, without guide friction; ``pull``: how much
+    stronger per weight the magnets are than believed.
     """
     machine = parameters.machine
-    end, speed = _fall(machine_constants(machine), y, speed, machine.gap_min, machine.gap_max)
+    stops = machine.gap_min, machine.gap_max
+    end, speed = _fall(
+        machine_constants(machine), pull, min(max(y, stops[0]), stops[1]), speed, *stops
+    )
     return abs(speed), 'upper' if end <= machine.gap_min else 'lower'
+
+
+def impacts_of_cut(parameters: BridgeParameters, y: float, speed: float) -> dict[str, float]:
+    """Speed [m/s] by each stop that a cut may end at, the harder first; arguments as above.
+
+    Near the balance either may be: the estimate is off by what encoders and observer are, and as
+    old as the watchdog allows, and the magnets by up to 10 %. A speed that no platen has says
+    nothing.
+    """
+    if not (math.isfinite(speed) and abs(speed) < _FASTEST):
+        speed, doubt = 0.0, _SPEED_UNKNOWN
+    else:
+        doubt = _SPEED_DOUBT + _SHARE_IN_DOUBT * abs(speed)
+    if not math.isfinite(y):
+        y = 0.5 * (parameters.machine.gap_min + parameters.machine.gap_max)
+    away = _PLACE_DOUBT + (abs(speed) + doubt) * parameters.boards.watchdog
+    falls = [
+        impact_of_cut(
+            parameters, y + side * away, speed + side * doubt, 1.0 - side * _SHARE_IN_DOUBT
+        )
+        for side in (-1.0, 1.0)
+    ]
+    likely, stop = impact_of_cut(parameters, y, speed)
+    found = {stop: speed for speed, stop in falls} | {stop: likely}
+    return dict(sorted(found.items(), key=lambda one: -one[1]))
