@@ -45,7 +45,7 @@ _SETTLING = 100  # samples in which the disturbance is found
 _DOUBT = 2.5e-5  # an encoder that should have moved this far is not followed [m]
 _CERTAIN = 1.5  # as many times max_unseen it is stuck whatever the others read
 _DOUBTFUL_RESIDUAL = 6e-5  # [m]
-_GROUND = 1e-3  # this near the lower stop nothing is at stake any more [m]
+_GROUND = 1e-3  # this near the lower stop no gap is at stake any more [m]
 _AGREED = 2e-5  # how near the others must read to what is foretold then [m]
 
 
@@ -92,10 +92,10 @@ def _least_step(g: GuardArrays, i: int) -> float:
 @compiled
 def _at_rest(g: GuardArrays, i: int) -> bool:
     """Whether friction, or the lower stop, may hold an encoder where it is."""
-    if not g.rigid and g.position[Y] > g.upper[Y] - _GROUND:
-        return True
     if i >= 4:
         return bool(g.least_rate[i - 3] == 0.0)
+    if not g.rigid and g.position[Y] > g.upper[Y] - _GROUND:
+        return True
     return bool(g.least_rate[Y] == 0.0 and g.least_rate[PHI if i % 2 == 0 else THETA] == 0.0)
 
 

@@ -182,9 +182,10 @@ def correct(o: ObserverArrays, length: FloatArray, used: Flags, counted: Flags) 
             _amend(o, axis, innovation[3 + axis])
         else:
             _coast(o, axis)
-    vertical = counted[0] or counted[1] or counted[2] or counted[3]
+    along_z, along_x = counted[0] or counted[2], counted[1] or counted[3]
+    told = (along_z or along_x, counted[4], counted[5], along_z, along_x)
     for axis in range(5):
-        if counted[3 + axis] if axis in (X, Z) else vertical:
+        if told[axis]:
             o.model_rate[axis], o.still_time[axis] = o.rate[axis], 0.0
             o.disturbance_then[axis] = o.disturbance[axis]
 

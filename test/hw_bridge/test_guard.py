@@ -1,0 +1,45 @@
+"""The judge of the encoders by itself: what tells of what, and who is at rest."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from maglev_hw_bridge import guard, observer
+from maglev_hw_bridge.amplifiers import Amplifiers
+from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_model.axes import PHI, THETA, X, Y, Z
+
+PARAMETERS = BridgeParameters()
+
+
+@pytest.mark.parametrize(
+    ('encoder', 'told'),
+    [(0, {Y, PHI}), (1, {Y, THETA}), (2, {Y, PHI}), (3, {Y, THETA}), (4, {X}), (5, {Z})],
+)
+def test_a_count_tells_only_of_the_axes_that_move_its_encoder(encoder: int, told: set[int]) -> None:
+    watched = guard.Guard(PARAMETERS).arrays
+    length = np.array([0.025, 0.025, 0.025, 0.025, 0.0, 0.0])
+    record = watched.block[0]
+    observer.start(record, length)
+    watched.still_time[:] = 0.01
+    counted = np.arange(6) == encoder
+    observer.correct(record, length, np.ones(6, np.bool_), counted)
+    assert set(np.flatnonzero(watched.still_time == 0.0)) == told
+
+
+@pytest.mark.parametrize(('current', 'found'), [(0.02, []), (1.0, [4])])
+def test_x_is_missed_near_the_lower_stop_too_when_a_gap_is_lost(
+    current: float, found: list[int]
+) -> None:
+    """There the landing would go on pushing a platen that it cannot see."""
+    judge, amplifiers = guard.Guard(PARAMETERS), Amplifiers(PARAMETERS)
+    y = PARAMETERS.machine.gap_max - 5e-4
+    length = np.array([y, y, y, y, 0.0, 0.0])
+    judge.arrays.trust[0] = guard.LOST
+    amplifiers.drive(np.zeros(4), np.array([0.0, current, 0.0, current]), 0.0, 0.0)
+    blamed: list[int] = []
+    for _ in range(300):
+        judge.watch(length, amplifiers.arrays.current, True)
+        blamed += judge.blamed
+    assert blamed == found
