@@ -50,7 +50,7 @@ def test_its_emergency_stop_lands_and_stays(nodes: Nodes, watching: Observer) ->
     watching.wait(lambda: watching.newest(CONTROLLER_STATE).mode == ControllerState.LANDING)
     assert not watching.call('/controller/reset').success
     landed_softly(watching)
-    assert watching.newest(CONTROLLER_STATE).mode == ControllerState.FAULT
+    watching.wait(lambda: watching.newest(CONTROLLER_STATE).mode == ControllerState.FAULT)
     assert not watching.call('/controller/enable', True).success
     assert watching.call('/controller/reset').success
     assert 'fault' not in graph['stage'].output
