@@ -1,19 +1,21 @@
-"""On its lower stop: lifted to tell it from the upper one."""
+"""On its lower stop: lifted to tell it from the upper one, resting, and leaving it unbidden."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from bridge_flight import Flight, hover
 
 from maglev_hw_bridge.drivers.emulated import EmulatedBoards
 from maglev_hw_bridge.drivers.quanser import QuanserDriver
 from maglev_hw_bridge.encoders import HomingError
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_hw_bridge.stage import BridgeStage
+from maglev_hw_bridge.stage import BridgeStage, Mode
 from maglev_model.guide import GuideParameters
 from maglev_model.parameters import build
 
 UPPER_STOP, LOWER_STOP = 0.018, 0.031
+NOMINAL = 0.01  # [m/s]
 FRICTION = np.array(GuideParameters().coulomb)
 
 HEAVY = {'K_v1': 0.9, 'K_v2': 0.9, 'K_v3': 0.9, 'mass_y': 1.1}
@@ -65,3 +67,74 @@ def test_what_is_heavier_than_any_sound_machine_is_not_lifted() -> None:
     with pytest.raises(HomingError, match='something holds it'):
         stage.home()
     stage.close()
+
+
+@pytest.mark.parametrize(('above', 'ends'), [(0.0, True), (5e-5, False), (1.5e-4, False)])
+def test_what_does_not_rest_yet_is_set_down(above: float, ends: bool) -> None:
+    flight = Flight(hover(LOWER_STOP - above))
+    flight.run(40 if above else 200)
+    flight.rig.forget_impact()
+    flight.stage.stop()
+    assert (flight.stage.mode is Mode.DISABLED) == ends
+    flight.until_no_current()
+    assert flight.rig.impact < NOMINAL
+
+
+def test_a_landing_is_not_cut_short_by_a_fault() -> None:
+    flight = Flight(hover(0.0305))
+    flight.run(200)
+    flight.stage.land('test')
+    while flight.rig.state[0] < LOWER_STOP - 1e-4:
+        flight.step(False)
+    flight.rig.forget_impact()
+    flight.stage.stop()
+    assert flight.stage.mode is Mode.LANDING
+    flight.until_no_current()
+    assert flight.rig.impact < NOMINAL
+
+
+@pytest.mark.parametrize(('samples', 'rests'), [(60, False), (130, True)])
+def test_where_it_stands_still_near_its_stop_it_rests(samples: int, rests: bool) -> None:
+    flight = Flight(hover(LOWER_STOP))
+    flight.stage.encoders.arrays.zero[:4] -= 1e-4  # a stop that is higher here
+    for _ in range(samples):
+        flight.stage.read()
+        flight.stage.write(np.full(4, 0.05), np.zeros(4))
+    assert flight.stage.guard.arrays.position[0] < LOWER_STOP - 5e-5
+    flight.stage.read()
+    flight.stage.write(np.zeros(4), np.zeros(4))
+    assert (flight.stage.fault is None) == rests
+
+
+def lift(flight: Flight, height: float, speed: float) -> None:
+    """Move the platen up by that from its stop, while the controller commands nothing."""
+    for above in np.arange(0.0, height, 1e-3 * speed):
+        flight.rig.place(np.array([LOWER_STOP - above, 0.0, 0.0, 0.0, 0.0]))
+        flight.stage.read()
+        flight.stage.write(np.zeros(4), np.zeros(4))
+
+
+@pytest.mark.parametrize(
+    ('height', 'speed', 'left'),
+    [(2.2e-4, 2e-3, False), (4e-4, 2e-3, True), (4e-5, 1e-3, False), (2.4e-4, 0.02, True)],
+)
+def test_a_platen_that_leaves_its_stop_without_current_is_a_fault(
+    height: float, speed: float, left: bool
+) -> None:
+    flight = Flight(hover(LOWER_STOP), {'boards.enable_output': 1})
+    flight.run(20, controlled=False)
+    lift(flight, height, speed)
+    assert ('left its stop' in str(flight.stage.fault)) == left
+    assert flight.boards.lines.enabled != left
+
+
+def test_what_was_moved_while_nobody_looked_has_not_left_its_stop() -> None:
+    flight = Flight(hover(LOWER_STOP))
+    lift(flight, 1e-4, 2e-3)
+    flight.stage.deactivate()
+    flight.rig.place(np.array([UPPER_STOP, 0.0, 0.0, 0.0, 0.0]))
+    flight.stage.activate()
+    for _ in range(5):
+        flight.stage.read()
+        flight.stage.write(np.zeros(4), np.zeros(4))
+    assert flight.stage.fault is None

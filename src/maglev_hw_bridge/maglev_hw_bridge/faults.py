@@ -82,6 +82,15 @@ def consequence_of_cut(parameters: BridgeParameters, watched: Guard) -> str:
     return f'; the platen strikes {" or ".join(parts)}'
 
 
+def astray_fault(watched: Guard) -> tuple[str, str]:
+    """Reason and remedy of a platen that left its stop while no current was commanded."""
+    height = watched.arrays.position[0]
+    reason = (
+        f'the platen left its stop, to y = {height * 1e3:.2f} mm, though no current was commanded'
+    )
+    return reason, 'check the amplifiers, one may be stuck on, and the gap encoders'
+
+
 def remaining_cause(
     parameters: BridgeParameters, stop_pressed: bool, watched: Guard, amplifier: Amplifiers
 ) -> str:

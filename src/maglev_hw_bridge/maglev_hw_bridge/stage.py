@@ -22,7 +22,9 @@ from maglev_model.stage import EncoderSample, Fault, StageError, Truth, motor_cu
 
 FloatArray = NDArray[np.float64]
 
-_ON_THE_STOP, _AT_REST = 2e-4, 0.02  # nearer the lower stop and slower it rests [m], [m/s]
+_ON_THE_STOP, _AT_REST = 1e-5, 3e-3  # nearer the lower stop and slower it rests [m], [m/s]
+_NEAR, _STILL, _REST_TIME = 2e-4, 1e-5, 0.1  # so it does where it moves no more there [m, m, s]
+_LEFT, _SOON = 3e-4, 0.02  # what rested and is, or soon will be, farther has left it [m], [s]
 
 
 class BridgeStage(StageLife):
@@ -48,6 +50,9 @@ class BridgeStage(StageLife):
         self._stale_samples = round(self.parameters.fault.stale / self.sample_time)
         self._longest_stop = round(self.parameters.boards.stop_time / self.sample_time)
         self._landing_samples = 0
+        self._still_samples = 0  # that the platen has stood still near its lower stop,
+        self._still_at = 0.0  # and where [m]
+        self._rests = False  # has rested there since current flowed last
         self._warm_up()
 
     @classmethod
@@ -97,6 +102,7 @@ class BridgeStage(StageLife):
         code, index = self.guard.watch(length, self.amplifiers.arrays.current, self.flying)
         if code != guard.FINE:
             self._sensing_fault(code, index)
+        self._look_for_rest()
         if self.driver.stop_pressed:
             self._raise_fault('stop', 'the emergency stop is pressed', 'release it')
         if self.driver.late > 0.5 * self.parameters.sample_time:
@@ -148,10 +154,25 @@ class BridgeStage(StageLife):
         self._raise_fault('current', reason, remedy)
         return '' if code == amplifiers.SPENT else reason
 
+    def _look_for_rest(self) -> None:
+        """Watch a platen that rests: only current, of which there is to be none, moves it away."""
+        y = self.guard.arrays.position[0]
+        above = self._lower_stop - y
+        if above < _NEAR and abs(y - self._still_at) < _STILL:
+            self._still_samples += 1
+        else:
+            self._still_samples, self._still_at = 0, y
+        begun = self.guard.arrays.samples > 1  # what rested in a life before may have been moved
+        self._rests = begun and not self.flying and (self._rests or self._on_the_stop())
+        soon = above - _SOON * self.guard.arrays.rate[0]
+        if self.mode is Mode.FOLLOWING and self._rests and max(above, soon) > _LEFT:
+            self._raise_fault('current', *faults.astray_fault(self.guard))
+
     def _on_the_stop(self) -> bool:
-        """Whether the platen rests on its lower stop."""
+        """Whether the platen rests on its lower stop, so that nothing falls without current."""
         y, rate = self.guard.arrays.position[0], self.guard.arrays.rate[0]
-        return bool(y > self._lower_stop - _ON_THE_STOP and abs(rate) < _AT_REST)
+        there = y > self._lower_stop - _ON_THE_STOP and abs(rate) < _AT_REST
+        return bool(there or self._still_samples * self.sample_time >= _REST_TIME)
 
     def _put_out(self) -> None:
         if self.mode is Mode.LANDING:
