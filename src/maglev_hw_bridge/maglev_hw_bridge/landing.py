@@ -29,8 +29,11 @@ LEAST_ATTRACTION = 0.1
 SEEING: Flags = np.zeros(5, np.bool_)
 """No axis is blind."""
 
-_CARRY = np.array([0.0, -1.0, 1.0, -2.0, 2.0])
-"""By blind axis, whether motors 1 and 3 are to carry (1) or motors 2 and 4 (-1)."""
+_CARRY = np.array([0.0, -2.0, 2.0, -1.0, 1.0])
+"""By blind axis, whether motors 1 and 3 are to carry (1) or motors 2 and 4 (-1).
+
+x and z come first: along them the platen runs off to a stop 50 mm away, in a tilt to one 2 mm away.
+"""
 
 _BRAKING_UPWARD = 0.1  # of y [s]
 _FREE_STEP = 1e-4  # of the motion without current [s]
