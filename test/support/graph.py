@@ -198,10 +198,13 @@ class Observer:
 
     def set_parameters(self, node: str, **values: Any) -> Any:
         """Set parameters of a node all at once; ``__`` in a name stands for a dot."""
-        future = self.begin_to_set(node, **values)
-        self._executor.spin_until_future_complete(future, timeout_sec=60.0)
-        assert future.done(), f'{node} never answered'
-        return future.result().result
+        return self.answer(self.begin_to_set(node, **values)).result
+
+    def answer(self, future: Any, timeout: float = 60.0) -> Any:
+        """What a future holds in the end."""
+        self._executor.spin_until_future_complete(future, timeout_sec=timeout)
+        assert future.done(), 'it was never answered'
+        return future.result()
 
     def begin_to_set(self, node: str, **values: Any) -> Any:
         """As :meth:`set_parameters`, but only the future answer."""
