@@ -112,8 +112,7 @@ def test_whoever_else_publishes_currents_is_not_obeyed(nodes: Nodes, watching: O
 def test_during_a_redesign_the_emergency_stop_is_served(nodes: Nodes, watching: Observer) -> None:
     fly(nodes, watching)
     client = watching.node.create_client(Trigger, '/controller/emergency_stop')
-    assert client.wait_for_service(timeout_sec=20.0)
-    watching.serve(0.5)
+    watching.make_heard(client)
     changing = watching.begin_to_set('controller', y__bandwidth=180.0)
     watching.serve(0.3)
     assert not changing.done()

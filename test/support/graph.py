@@ -186,11 +186,15 @@ class Observer:
 
     def begin_to_ask(self, client: Any, request: Any, timeout: float = 20.0) -> Any:
         """The future answer of any service."""
+        self.make_heard(client, timeout)
+        return client.call_async(request)
+
+    def make_heard(self, client: Any, timeout: float = 20.0) -> None:
+        """Wait until a service is there, and would hear the client."""
         assert client.wait_for_service(timeout_sec=timeout), f'there is no {client.srv_name}'
         if client not in self._heard:  # there for us, but are we there for it?
             self._heard.append(client)
             self.serve(_MATCHING)
-        return client.call_async(request)
 
     def serve(self, duration: float) -> None:
         """Let callbacks of the test's own run."""
