@@ -27,7 +27,7 @@ find_keys() {
   sums=$(sha256sum setup/{requirements{,-build,-ros},constraints-ros}.txt | sha256sum)
   environment_key="1 $branch $ros_prefix $root ${sums%% *}"
   sums=$(sha256sum setup/*.bash src/*/{package.xml,CMakeLists.txt,setup.{py,cfg}} \
-    src/*/{msg,srv}/* | sha256sum)
+    src/*/{msg,srv}/* setup/tf2_msgs/{package.xml,CMakeLists.txt,msg/*} | sha256sum)
   build_key="$environment_key ${sums%% *}"
   # Numba sees a change of a function's own file only, not of what it calls: another cache for each
   # state of the sources, or a run would silently use old code.

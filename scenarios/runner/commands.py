@@ -10,7 +10,7 @@ from typing import NoReturn
 
 from runner.console import complain, talk_to, write
 from runner.folder import default_folder
-from runner.graph import Flight, Scenario
+from runner.graph import VIEWS, Flight, Scenario
 from runner.options import (
     Command,
     HelpAskedError,
@@ -123,6 +123,8 @@ def _flight_command(name: str, description: str, call: str = '') -> Command:
             overlay,
         ),
         '--namespace': NAMESPACE,
+        '--view': Option('show the flight live in the browser'),
+        '--no-view': Option('no standard topics for RViz, Foxglove and PlotJuggler'),
         '--out': _out_option('the run is', name),
         '--quiet': Option('say only what is wrong'),
         '--json': Option(
@@ -148,7 +150,13 @@ def _flight(scenario: Scenario, command: Command, options: Sequence[str]) -> Fli
         overlays=tuple(given.get('--params', ())),
         namespace=where,
         as_json='--json' in given,
+        views=_views(given),
     )
+
+
+def _views(given: Mapping[str, list[str]]) -> tuple[str, ...]:
+    wanted = {'view': '--no-view' not in given, 'web': '--view' in given}
+    return tuple(view for view in VIEWS if wanted[view])
 
 
 def _fly_in_turn(*flights: Flight) -> int:
