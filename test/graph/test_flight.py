@@ -78,7 +78,6 @@ def test_a_controller_is_waited_for_and_lands_without_its_reference(
     assert answer.success
 
 
-@pytest.mark.alone
 def test_all_that_a_flight_bears(nodes: Nodes, watching: Observer) -> None:
     """Second nodes, new parameters, a landing and another lift-off, the controller's end."""
     graph = fly(nodes, LONG)

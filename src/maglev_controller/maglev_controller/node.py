@@ -13,6 +13,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.supervision import Supervisor
+from maglev_model.controller_watch import NOBODY
 from maglev_model.modes import Mode
 from maglev_model.parameters import build, parameter, specs, values
 from maglev_model.phases import Phase
@@ -82,7 +83,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         self._sequence = -1
         self._pending: Measurement | None = None
         self._pending_since = self._answered = 0.0
-        self._reference_lost = self._reference_over = False
+        self._reference_lost = self._reference_over = self._silent = False
         self._logged = (self.supervisor.mode, self.supervisor.reason)
         self._currents, self._state = Currents(), ControllerState()
         self._currents.session = secrets.randbits(64) | 1
@@ -131,7 +132,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
 
     def _on_measurement(self, message: Measurement) -> None:
         sequence = message.sequence
-        if self._in_another_mode(message):
+        if self._in_another_mode(message) or self._anothers(message):
             return
         if self._sequence < 0 and not self._watchers.there(CURRENTS, CONTROLLER_STATE):
             return
@@ -164,6 +165,19 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         if not self.supervisor.flying:  # in flight it is a second one, which will leave
             self.fail(mode_conflict(self.parameters.mode, message.lockstep))
         return True
+
+    def _anothers(self, message: Measurement) -> bool:
+        """Whether another controller flies this stage, into which we must not speak.
+
+        The graph tells of it too, but on a busy machine only later.
+        """
+        another = message.controller not in (NOBODY, self._currents.session)
+        if another and not self._silent:
+            self.get_logger().warning(
+                f'silent since sample {message.sequence}: another controller flies this stage'
+            )
+        self._silent = another
+        return another
 
     def _awaits_reference(self, sequence: int) -> bool:
         """Whether an answer waits; without current only so that the loop sleeps, see _watch."""

@@ -50,9 +50,14 @@ class SamplePublisher:
         self._first = None
 
     def publish(
-        self, sequence: int, sample: EncoderSample, late_samples: int, truth: Truth | None
+        self,
+        sequence: int,
+        sample: EncoderSample,
+        late_samples: int,
+        controller: int,
+        truth: Truth | None,
     ) -> None:
-        """Publish one sample."""
+        """Publish one sample; ``controller`` is the session of the one whose currents flow."""
         message = self._measurement
         message.wall_time = time.time_ns()
         if self._first is None:
@@ -61,6 +66,7 @@ class SamplePublisher:
         message.sequence = sequence
         message.gap, message.x, message.z = sample
         message.late_samples = late_samples
+        message.controller = controller
         self._publisher.publish(message)
         if truth is not None and self._true_publisher is not None:
             self._publish_truth(truth)

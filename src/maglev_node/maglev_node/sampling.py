@@ -6,7 +6,7 @@ import time
 from itertools import count
 from typing import Any, Generic, TypeVar
 
-from maglev_model.controller_watch import ControllerWatch, Verdict
+from maglev_model.controller_watch import NOBODY, ControllerWatch, Verdict
 from maglev_model.stage import EncoderSample, Fault, Stage, StageError
 from maglev_msgs.msg import Currents
 from maglev_node.managed_node import ManagedNode
@@ -236,8 +236,11 @@ class Sampling(Generic[P, S]):
 
     def _publish(self) -> None:
         if self._sample is not None:
+            controller = self.controller.session if self.stage.flying else NOBODY
             truth = self.stage.truth()
-            self._publisher.publish(self.sequence, self._sample, self.late_samples, truth)
+            self._publisher.publish(
+                self.sequence, self._sample, self.late_samples, controller, truth
+            )
 
     def _judge(self, message: Currents) -> Verdict:
         """What becomes of a command; one that is refused is a fault."""
