@@ -264,8 +264,12 @@ stage.close()' &
   in_environment python -c 'import maglev_study.closed_loop as loop
 import maglev_controller.node, maglev_plant.node, maglev_reference.node
 import maglev_monitor.bag.recorder, maglev_monitor.live.node, maglev_monitor.report.run_report
+import maglev_view.forces, maglev_view.node, numpy
+from maglev_model.machine import MachineParameters
 from maglev_reference import parameters, timeline
 loop.warm_up()
-timeline.Timeline(parameters.ReferenceParameters())' || echo 'not compiled'
+timeline.Timeline(parameters.ReferenceParameters())
+level, none = numpy.array([0.025, 0.0, 0.0, 0.0, 0.0]), numpy.zeros(4)
+maglev_view.forces.Forces(MachineParameters()).at(level, none, none)' || echo 'not compiled'
   wait $! || echo 'not compiled'
 }

@@ -85,7 +85,7 @@ def path(stamp: Time, poses: Iterable[PoseStamped]) -> Path:
 
 
 def arrows(stamp: Time, forces: Sequence[Force], scale: float, limit: float) -> MarkerArray:
-    """The forces, ``scale`` [m/N] long, in the colour of each motor's current over ``limit`` [A]."""
+    """The forces, ``scale`` [m/N] long, coloured by each motor's current over ``limit`` [A]."""
     return MarkerArray(markers=[_arrow(stamp, force, scale, limit) for force in forces])
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import os
 from collections.abc import Mapping
@@ -20,7 +21,7 @@ from visualization_msgs.msg import MarkerArray
 from maglev_model.axes import FloatArray
 from maglev_model.geometry import outputs_of_gaps
 from maglev_node.graph_guard import GraphGuard
-from maglev_node.node import MaglevNode
+from maglev_node.node import MaglevNode, NodeParameters
 from maglev_node.polling import PolledSubscription
 from maglev_node.process import main as run_main
 from maglev_node.stamp import nanoseconds
@@ -71,7 +72,12 @@ _LATCHED = QoSProfile(
 )
 
 
-class ViewNode(MaglevNode[ViewParameters]):
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class ViewNodeParameters(NodeParameters, ViewParameters):
+    """The view's parameters."""
+
+
+class ViewNode(MaglevNode[ViewNodeParameters]):
     """Publishes the stage as joints, frames, poses and markers of the standard packages.
 
     A watcher that the loop does not know: it takes the newest sample when it comes to it, and
@@ -91,7 +97,7 @@ class ViewNode(MaglevNode[ViewParameters]):
     }
 
     def __init__(self) -> None:
-        super().__init__('view', ViewParameters)
+        super().__init__('view', ViewNodeParameters)
         GraphGuard(self).claim(STAGE_POSE, 'view')
         taken = self.parameters
         self._outlets = {

@@ -41,3 +41,28 @@ class ViewParameters(StageParameters):
     force_scale: float = parameter(
         4e-3, 'length of an arrow over its force', unit='m/N', within=(1e-6, 1.0)
     )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class WebParameters(StageParameters):
+    """Where the page is served and what it shows."""
+
+    host: str = parameter(
+        '127.0.0.1', 'address to serve the page at; 0.0.0.0: to everybody', read_only=True
+    )
+    port: int = parameter(
+        8080, 'port of the page, or the next one that is free', within=(0, 65535), read_only=True
+    )
+    rate: float = parameter(
+        25.0, 'how often the page is told where the platen is', unit='Hz', within=(1.0, 60.0)
+    )
+    window: float = parameter(
+        10.0, 'what the plots show, in stage time', unit='s', within=(0.5, 600.0)
+    )
+    bins: int = parameter(
+        500, 'points of a curve, each the least and the greatest of its bin', within=(50, 5000)
+    )
+    path_points: int = parameter(400, 'longest path', within=(2, 5000))
+    path_step: float = parameter(
+        5e-4, 'least distance of two points of a path', unit='m', within=(1e-6, 1.0)
+    )

@@ -76,9 +76,7 @@ def _platen(machine: MachineParameters) -> Iterator[Part]:
         first = -0.5 * (machine.magnets - 1) * machine.pole_pitch
         size = _along(motor, machine.magnet_width, machine.magnet_length, machine.magnet_height)
         for magnet in range(machine.magnets):
-            x, y, _ = (
-                (first + magnet * machine.pole_pitch) * along for along in motor.direction
-            )
+            x, y, _ = ((first + magnet * machine.pole_pitch) * along for along in motor.direction)
             centre = (x, y, -0.5 * machine.magnet_height)
             yield Part(motor.mover, size, centre, MAGNET, motor.number)
         size = _along(motor, row, 2.0 * machine.magnet_length, _PLATE)

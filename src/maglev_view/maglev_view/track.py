@@ -24,10 +24,12 @@ class Track(Generic[T]):
 
     def add(self, where: Vector, make: Callable[[], T]) -> bool:
         """Take a point [m] if it is far enough from the last one; whether it is."""
-        last = self._last
-        if last is not None:
-            if sum((a - b) ** 2 for a, b in zip(where, last, strict=True)) < self._least:
-                return False
+        if self._last is not None and _square(where, self._last) < self._least:
+            return False
         self._last = where
         self.points.append(make())
         return True
+
+
+def _square(a: Vector, b: Vector) -> float:
+    return (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2

@@ -37,7 +37,7 @@ def description(machine: MachineParameters) -> str:
         joint = _add_joint(robot, moved.name, kind, moved.parent, moved.child)
         SubElement(joint, 'axis', xyz=_text(moved.axis))
         low, high = machine.lower_limit[moved.output], machine.upper_limit[moved.output]
-        SubElement(joint, 'limit', lower=repr(low), upper=repr(high), **_MOST)
+        SubElement(joint, 'limit', {'lower': repr(low), 'upper': repr(high), **_MOST})
     ElementTree.indent(robot)
     return '<?xml version="1.0"?>\n' + ElementTree.tostring(robot, encoding='unicode')
 
