@@ -31,7 +31,7 @@ class Browser:
         options += ['--enable-unsafe-swiftshader', '--disable-dev-shm-usage', '--no-first-run']
         options += ['--disable-background-networking', '--disable-component-update']
         options += ['--remote-debugging-port=0', f'--user-data-dir={folder}', '--mute-audio']
-        options += ['--window-size=1200,800', 'about:blank']
+        options += ['--window-size=900,500', 'about:blank']
         self._process = subprocess.Popen(
             ['nice', '-n', '5', found(), *options],
             stdout=subprocess.DEVNULL,
@@ -59,17 +59,17 @@ class Browser:
         result = self._ask('Runtime.evaluate', expression=expression, returnByValue=True)
         return result['result'].get('value')
 
-    def wait(self, expression: str, timeout: float = 60.0) -> Any:
-        """Wait until an expression is true; its value."""
+    def wait(self, expression: str, timeout: float = 60.0) -> None:
+        """Wait until an expression is true."""
         deadline = time.monotonic() + timeout
-        while not (value := self.evaluate(expression)):
+        while not self.evaluate(f'Boolean({expression})'):
             assert time.monotonic() < deadline, f'never true: {expression}'
             time.sleep(0.1)
-        return value
 
-    def picture(self) -> bytes:
-        """What is seen, as PNG."""
-        return base64.b64decode(self._ask('Page.captureScreenshot')['data'])
+    def picture(self, width: int, height: int) -> bytes:
+        """What is seen in the upper left corner, as PNG."""
+        clip = {'x': 0, 'y': 0, 'width': width, 'height': height, 'scale': 1}
+        return base64.b64decode(self._ask('Page.captureScreenshot', clip=clip)['data'])
 
     def close(self) -> None:
         """End the browser with all its processes."""
