@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import signal
@@ -12,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from page_client import PageClient
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -84,6 +86,22 @@ def marked_processes(mark: str) -> list[str]:
     return found
 
 
+def look_and_kill(out: Path) -> None:
+    """Look at the page of a flight, close it without a word, and kill what serves it."""
+    log, words = out / 'log' / 'web.log', 'live view: '
+    deadline = time.monotonic() + 120
+    while not log.exists() or words not in log.read_text():
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
+    page = PageClient(log.read_text().rpartition(words)[2].split()[0])
+    page.wait(lambda: len(page.of('SetPositionMessage')) > 100)
+    page.close()
+    for entry in Path('/proc').glob('[0-9]*'):
+        with contextlib.suppress(OSError):
+            if f'{out}/params/web.yaml'.encode() in (entry / 'cmdline').read_bytes():
+                os.kill(int(entry.name), signal.SIGKILL)
+
+
 @pytest.fixture(scope='module')
 def alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a run that nothing else disturbed, and that has passed."""
@@ -138,6 +156,7 @@ def test_two_stages_fly_on_one_domain_at_once_as_each_does_alone_and_unseen(
         )
         for (scenario, namespace, _), given in called.items()
     ]
+    look_and_kill(tmp_path / 'stage1')
     for process, (_, _, code) in zip(together, called, strict=True):
         output, _ = process.communicate(timeout=300)
         assert process.returncode == code, output

@@ -58,6 +58,15 @@ def test_a_view_that_will_not_end_fails_nothing(tree: Tree) -> None:
     assert tree.alive() == []
 
 
+@pytest.mark.parametrize(('options', 'expected'), [((), ''), (('--view',), 'view')])
+def test_what_the_page_needs_is_installed_when_it_is_wanted(
+    tree: Tree, monkeypatch: pytest.MonkeyPatch, options: tuple[str, ...], expected: str
+) -> None:
+    monkeypatch.delenv('MAGLEV_SETUP', raising=False)
+    (tree.path / 'setup.sh').write_text('echo "set-up: $MAGLEV_SETUP"\nexit 70\n')
+    assert tree.run(*options) == (70, f'set-up: {expected}\n')
+
+
 def test_a_view_that_cannot_be_started_fails_before_the_start(tree: Tree) -> None:
     (tree.path / 'prefix' / 'lib' / 'maglev_view' / 'view').unlink()
     code, output = tree.run()
