@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 from made_up_run import Encoder, Run, make_run
@@ -33,7 +35,7 @@ def live(run: Run) -> Live:
 
 def test_the_newest_sample_is_shown(run: Run, live: Live) -> None:
     assert live.sequence == SAMPLES - 1
-    assert live.time == pytest.approx(0.399)
+    assert live.stage_time == pytest.approx(0.399)
     assert live.outputs == pytest.approx(run.position[-1], abs=3e-5)  # counted
     assert live.phase == Phase(run.phase[-1]).name
     assert live.currents == pytest.approx(np.hypot(run.direct[-1], run.quadrature[-1]))
@@ -61,6 +63,24 @@ def test_faults_are_shown_with_their_remedy_until_they_are_gone(live: Live) -> N
     assert 'waiting' not in text
     live.told('plant', 0, 'running', {})
     assert 'what to do' not in status_html(live)
+
+
+@pytest.mark.parametrize(
+    ('mode', 'said'),
+    [('FAULT', 'press Reset, then Enable, then Lift off'), ('DISABLED', 'press Enable, then Lift')],
+)
+def test_what_to_do_about_a_controller_is_said(live: Live, mode: str, said: str) -> None:
+    live.told('controller', 2, f'{mode}: emergency stop', {'mode': mode})
+    assert said in status_html(live)
+    live.told('controller', 0, 'regulating', {'mode': 'REGULATING'})
+    assert said not in status_html(live)
+
+
+def test_a_stage_that_falls_silent_is_noticed(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert 'no sample for' not in status_html(live)
+    now = time.monotonic()
+    monkeypatch.setattr(time, 'monotonic', lambda: now + 7.0)
+    assert 'no sample for 7 s' in status_html(live)
 
 
 def test_bars_are_full_at_the_limit(live: Live) -> None:

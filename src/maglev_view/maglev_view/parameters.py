@@ -13,9 +13,6 @@ class StageParameters:
     """What is looked at."""
 
     machine: MachineParameters = group(MachineParameters)
-    sample_time: float = parameter(
-        1e-3, 'stage time from sample to sample', unit='s', within=(1e-5, 1.0), read_only=True
-    )
     peak_current: float = parameter(
         7.0, 'amplitude at which a motor is drawn in red', unit='A', within=(0.01, 1000.0)
     )
@@ -52,6 +49,9 @@ class WebParameters(StageParameters):
     )
     port: int = parameter(
         8080, 'port of the page, or the next one that is free', within=(0, 65535), read_only=True
+    )
+    sample_time: float = parameter(
+        1e-3, 'stage time from sample to sample', unit='s', within=(1e-5, 1.0), read_only=True
     )
     rate: float = parameter(
         25.0, 'how often the page is told where the platen is', unit='Hz', within=(1.0, 60.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -20,6 +21,12 @@ from maglev_view.web.history import History
 
 ERROR_LEVEL = 2
 """Diagnostic level from which on a node has a fault (REP-107: ERROR)."""
+
+REMEDIES = {
+    'FAULT': 'press Reset, then Enable, then Lift off',
+    'DISABLED': 'press Enable, then Lift off',
+}
+"""Of a controller, by its mode; a stage says its own."""
 
 _PACE_TIME = 1.0  # over which the real-time factor is taken, wall clock [s]
 
@@ -57,6 +64,7 @@ class Live:
         self.flown: Track[Vector] = Track(points, step)
         self.planned: Track[Vector] = Track(points, step)
         self._mark: tuple[int, int] | None = None
+        self._heard = -math.inf
 
     def take(self, key: str, rows: Records) -> None:
         """Take decoded samples of one topic, by its key."""
@@ -77,20 +85,27 @@ class Live:
 
     def told(self, node: str, level: int, text: str, values: Mapping[str, str]) -> None:
         """Take what a node says of itself."""
-        self.nodes[node] = NodeState(level, text, values.get('remedy', ''))
+        remedy = values.get('remedy') or REMEDIES.get(values.get('mode', ''), '')
+        self.nodes[node] = NodeState(level, text, remedy)
         if 'i2t_load' in values:
             self.load = np.full(4, float(values['i2t_load']))
 
     @property
-    def time(self) -> float:
+    def stage_time(self) -> float:
         """Stage time since sample 0 [s]."""
         return max(0, self.sequence) * self._parameters.sample_time
+
+    @property
+    def silence(self) -> float:
+        """For how long no sample has come, by the wall clock [s]."""
+        return time.monotonic() - self._heard
 
     def faults(self) -> dict[str, NodeState]:
         """The nodes that have one."""
         return {name: state for name, state in self.nodes.items() if state.level >= ERROR_LEVEL}
 
     def _measured(self, last: np.void) -> None:
+        self._heard = time.monotonic()
         self.sequence, self.late_samples = int(last['sequence']), int(last['late_samples'])
         radius = self._parameters.machine.radius
         outputs = outputs_of_gaps(last['gap'], float(last['x']), float(last['z']), radius)

@@ -50,7 +50,7 @@ class Page:
         gui.configure_theme(show_logo=False, show_share_button=False, control_width='large')
         self._scene = StageScene(self._server.scene, parameters.machine)
         camera = self._server.initial_camera
-        camera.position, camera.look_at = (1.3, -1.3, 0.7), (0.0, 0.0, 0.15)
+        camera.position, camera.look_at = (1.0, -1.2, 0.45), (0.2, 0.0, 0.12)
         self._status = gui.add_html(status_html(Live(parameters)))
         with gui.add_folder('Operate'):
             for label, colour in BUTTONS.items():

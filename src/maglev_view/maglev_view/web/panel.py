@@ -13,6 +13,7 @@ from maglev_view.colours import colour_of
 from maglev_view.web.live import Live
 
 _SCALE, _UNITS = 1e6, ('µm', 'µm', 'µm', 'µrad', 'µrad')
+_PATIENCE = 1.0  # with a stage that is silent [s]
 _CELL = 'padding:1px 6px 1px 0'
 
 
@@ -24,9 +25,11 @@ def status_html(live: Live) -> str:
     pace = '' if math.isnan(live.pace) else f' at {live.pace:.2f} × real time'
     rows = [
         ('phase', f'{live.phase or "–"}, controller {live.mode.lower() or "–"}'),
-        ('stage time', f'{live.time:.2f} s{pace}'),
+        ('stage time', f'{live.stage_time:.2f} s{pace}'),
         ('late', late),
     ]
+    if live.silence > _PATIENCE:
+        rows.append(('silent', f'no sample for {live.silence:.0f} s'))
     return _table(rows) + _errors(live) + _faults(live)
 
 

@@ -9,12 +9,14 @@ import numpy as np
 
 from maglev_model.axes import PHI, FloatArray
 from maglev_model.machine import MachineParameters
-from maglev_view.colours import Colour, colour_of
+from maglev_view.colours import STEEL, Colour, colour_of
 from maglev_view.frames import FACE_HEIGHT, PLATEN, STAGE, Vector, motors, mounts, platen_pose
 from maglev_view.parts import parts
 
 FLOWN, PLANNED = (0, 114, 178), (213, 94, 0)
 """Colours of the two paths."""
+
+_GLASS = 0.3  # what the frame is made of, so that the platen is seen
 
 
 class StageScene:
@@ -93,7 +95,8 @@ def _add_boxes(scene: Any, machine: MachineParameters) -> dict[int, Any]:
     stators = {}
     for number, part in enumerate(parts(machine)):
         name, colour = f'{paths[part.frame]}/box_{number}', _bytes(part.colour)
-        box = scene.add_box(name, colour, part.size, position=part.centre)
+        opacity = _GLASS if part.colour == STEEL else None
+        box = scene.add_box(name, colour, part.size, position=part.centre, opacity=opacity)
         if part.frame.startswith('stator'):
             stators[part.motor] = box
     return stators
