@@ -9,6 +9,9 @@ ALUMINIUM: Colour = (0.72, 0.77, 0.82)
 IRON: Colour = (0.30, 0.34, 0.38)
 MAGNET: Colour = (0.78, 0.33, 0.24)
 
+AXIS_COLOURS = ('#0072b2', '#e69f00', '#009e73', '#cc79a7', '#d55e00')
+"""Of y, x, z, phi, theta: apart to every eye."""
+
 _COLD, _WARM, _HOT = (0.13, 0.40, 0.67), (0.97, 0.85, 0.55), (0.70, 0.09, 0.17)
 
 

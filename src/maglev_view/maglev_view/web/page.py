@@ -12,6 +12,7 @@ import numpy as np
 import viser
 
 from maglev_model.axes import AXES
+from maglev_view.colours import AXIS_COLOURS
 from maglev_view.parameters import WebParameters
 from maglev_view.web.guard import trusted
 from maglev_view.web.live import Live
@@ -27,7 +28,6 @@ BUTTONS = {
 }
 """What an operator may ask for, with the colours of the buttons."""
 
-_COLOURS = ('#0072b2', '#e69f00', '#009e73', '#cc79a7', '#d55e00')  # apart to every eye
 _PLOTS = {'errors in y, x, z [µm]': (0, 1, 2), 'errors in phi, theta [µrad]': (3, 4)}
 _SLOW = 5  # the plots are drawn at every so many updates
 
@@ -98,7 +98,7 @@ class Page:
         series: list[dict[str, Any]] = [{'label': 't [s]'}]
         bands = []
         for column in columns:
-            colour = _COLOURS[column]
+            colour = AXIS_COLOURS[column]
             first = len(series)
             series += [{'label': AXES[column], 'stroke': colour, 'width': 1}]
             series += [{'label': f'{AXES[column]} high', 'stroke': colour, 'width': 1}]

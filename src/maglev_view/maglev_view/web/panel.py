@@ -9,7 +9,7 @@ from html import escape
 import numpy as np
 
 from maglev_model.axes import AXES
-from maglev_view.colours import colour_of
+from maglev_view.colours import AXIS_COLOURS, colour_of
 from maglev_view.web.live import Live
 
 _SCALE, _UNITS = 1e6, ('µm', 'µm', 'µm', 'µrad', 'µrad')
@@ -42,10 +42,10 @@ def _errors(live: Live) -> str:
         return ''
     greatest = np.max(np.where(known, peaks, 0.0), axis=0)
     texts = (
-        f'{axis} {_SCALE * value:.1f} {unit}'
-        for axis, value, unit in zip(AXES, greatest, _UNITS, strict=True)
+        f'<b style="color:{colour}">{axis}</b> {_SCALE * value:.1f} {unit}'
+        for axis, colour, value, unit in zip(AXES, AXIS_COLOURS, greatest, _UNITS, strict=True)
     )
-    return _paragraph('greatest |e| shown: ' + ', '.join(texts))
+    return f'<div style="font-size:90%">greatest |e| below: {", ".join(texts)}</div>'
 
 
 def _faults(live: Live) -> str:
