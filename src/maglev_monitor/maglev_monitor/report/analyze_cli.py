@@ -71,7 +71,9 @@ def _beside(bag: Path) -> Path:
 
 
 def _write(folder: Path, analysis: Analysis) -> None:
-    from maglev_monitor.report.run_report import write_report  # matplotlib takes a second to load
+    from maglev_monitor.report.run_report import (
+        write_report,
+    )  # its figures' library is slow to load
 
     write_report(folder / 'report.html', analysis)
     if not (folder / 'metrics.json').exists():
