@@ -12,7 +12,7 @@ import pytest
 from bokeh.resources import Resources
 from made_up_run import TOPICS, open_bag, write_samples
 
-from maglev_model.parameters import ParameterError, build
+from maglev_model.parameters import DIFFERS, ParameterError, build
 from maglev_monitor.bag.analysis import analyse
 from maglev_monitor.metrics.decoding import decode
 from maglev_monitor.metrics.joiner import Joiner
@@ -69,8 +69,13 @@ def test_report_goes_beside_the_bag_and_keeps_the_live_metrics(bag: Path, tmp_pa
     folder = tmp_path / 'run'
     shutil.copytree(bag, folder / 'bag')
     (folder / 'metrics.json').write_text('live')
+    (folder / 'params').mkdir()
+    lines = f'{DIFFERS}fan: 7 (by default 2)\n{DIFFERS}effective_parameters: no news\nplant:\n'
+    (folder / 'params' / 'plant.yaml').write_text(lines)
     assert analyze([str(folder / 'bag')]) == PASS
-    assert (folder / 'report.html').is_file()
+    page = (folder / 'report.html').read_text(encoding='utf-8')
+    assert '<tr><td>plant</td><td>fan: 7 (by default 2)</td></tr>' in page
+    assert 'no news' not in page
     assert (folder / 'metrics.json').read_text() == 'live'
 
 

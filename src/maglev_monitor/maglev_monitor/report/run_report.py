@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +39,7 @@ def render(analysis: Analysis) -> str:
         _tracking_table(result),
         _step_table(result),
         _limits_table(result['limits']),
+        _changes_table(analysis.changes),
         *render_charts(list(charts(analysis))),
     ]
     return page(name, parts)
@@ -112,3 +113,9 @@ def _limits_table(limits: Mapping[str, Any]) -> str:
             shown = number(value)
         rows.append([name.replace('_', ' '), shown])
     return '<h2>Limits</h2>' + html_table(['limit', 'value'], rows) if rows else ''
+
+
+def _changes_table(changes: Sequence[tuple[str, str]]) -> str:
+    if not changes:
+        return ''
+    return '<h2>Parameters that are not as by default</h2>' + html_table(['node', ''], changes)
