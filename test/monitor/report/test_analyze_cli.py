@@ -181,3 +181,26 @@ def test_metrics_are_written_whole_or_not_at_all(
     with pytest.raises(TypeError):
         write_metrics(path, {'verdict': object()})
     assert json.loads(path.read_text()) == {'verdict': 'pass'}
+
+
+def test_two_runs_lie_side_by_side(bag: Path, tmp_path: Path, capsys: Any) -> None:
+    other = tmp_path / 'other' / 'bag'
+    shutil.copytree(bag, other)
+    (other.parent / 'params').mkdir()
+    (other.parent / 'params' / 'plant.yaml').write_text(f'{DIFFERS}fan: 7 (by default 2)\n')
+    assert analyze([str(bag), str(other), '--out', str(tmp_path)]) == PASS
+    page = (tmp_path / 'two_runs.html').read_text(encoding='utf-8')
+    assert 'plant: fan: 7 (by default 2)' in page
+    assert page.count('<td>1.00</td>') == 3 * 5
+    assert page.count('overshoot') == 2 * 2
+    assert page.count('data-root-id=') == 5
+    assert capsys.readouterr().out.count('verdict: pass') == 2
+    assert not (tmp_path / 'metrics.json').exists()
+
+
+def test_a_second_run_that_cannot_be_read_is_one_line(
+    bag: Path, tmp_path: Path, capsys: Any
+) -> None:
+    assert analyze([str(bag), str(tmp_path / 'none'), '--out', str(tmp_path)]) == BAD_BAG
+    assert 'none' in capsys.readouterr().err
+    assert not list(tmp_path.glob('*.html'))
