@@ -97,7 +97,7 @@ def fly(
     here by name wins over them, ``plant={'encoder.gap_noise': 1e-6}``.
 
     Raises ParameterError naming what is wrong with a parameter or out of the reference's reach, and
-    MeasurementFault when the regulator gives the platen up.
+    MeasurementFault when the regulator gives the platen up, LawFault when a law of your own fails.
     """
     followed: dict[str, object] = {}
     if trajectory is not None:
