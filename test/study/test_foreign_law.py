@@ -79,9 +79,9 @@ def test_a_mistake_ends_the_run_with_its_sample(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(Counting, 'last', 30)
     with pytest.raises(LawFault, match='sample 30: .* raised RuntimeError: enough'):
         run(regulator(), stage(), held(HOVER, 0.1, PERIOD))
+    references = held(HOVER, 0.1, PERIOD)
+    references.position[3] = np.nan
     with pytest.raises(MeasurementFault, match='sample 3: the reference'):
-        references = held(HOVER, 0.1, PERIOD)
-        references.position[3] = np.nan
         run(regulator(), stage(), references)
 
 
