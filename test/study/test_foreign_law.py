@@ -77,7 +77,7 @@ def test_the_loop_is_what_regulator_and_stage_give_in_turn() -> None:
 
 def test_a_mistake_ends_the_run_with_its_sample(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Counting, 'last', 30)
-    with pytest.raises(LawFault, match='sample 30: .* raised RuntimeError: enough'):
+    with pytest.raises(LawFault, match=r'sample 30: .* raised RuntimeError: enough'):
         run(regulator(), stage(), held(HOVER, 0.1, PERIOD))
     references = held(HOVER, 0.1, PERIOD)
     references.position[3] = np.nan
