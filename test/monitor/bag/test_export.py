@@ -15,9 +15,10 @@ from scipy.io import loadmat
 
 import maglev_monitor
 from maglev_model.axes import AXES
+from maglev_model.optional import MissingLibraryError
 from maglev_monitor.bag.columns import COLUMNS, FIRST, NONE, Table, table
 from maglev_monitor.bag.errors import BagError
-from maglev_monitor.bag.export import FORMATS, MissingLibraryError, write
+from maglev_monitor.bag.export import FORMATS, write
 from maglev_monitor.bag.export_cli import DONE, FAILED, export
 
 PAGE = Path(__file__).resolve().parents[3] / 'docs' / 'data.md'

@@ -2,31 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
 import csv
 import io
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from maglev_model.optional import needed
 from maglev_monitor.bag.columns import Table, table
 
 _ROWS = 10_000  # of text that is made at once
-
-
-class MissingLibraryError(ImportError):
-    """A library that is no part of the set-up is needed; the message says how to install it."""
-
-
-@contextlib.contextmanager
-def needed(name: str, what: str) -> Iterator[None]:
-    """Import a library that is only needed here. Raises :class:`MissingLibraryError` naming it."""
-    try:
-        yield
-    except ImportError as error:
-        raise MissingLibraryError(f'{what} needs {name}: pip install {name}') from error
 
 
 def read(path: str | Path) -> Any:
@@ -34,7 +21,7 @@ def read(path: str | Path) -> Any:
 
     One row a sample; ``attrs`` holds ``units`` and ``descriptions`` by column, and ``notes`` on the
     bag. Raises :class:`~.errors.BagError` for what is no bag of a run, and
-    :class:`MissingLibraryError` without pandas.
+    :class:`~maglev_model.optional.MissingLibraryError` without pandas.
     """
     with needed('pandas', 'read'):
         import pandas

@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import NoReturn
 
 from maglev_model.command import leave_with
+from maglev_model.optional import MissingLibraryError
 from maglev_monitor.bag.columns import table
 from maglev_monitor.bag.errors import BagError
-from maglev_monitor.bag.export import FORMATS, MissingLibraryError, write
+from maglev_monitor.bag.export import FORMATS, write
 
 DONE, FAILED = 0, 2
 
