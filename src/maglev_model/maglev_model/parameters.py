@@ -104,6 +104,14 @@ class Spec:
             f' its type is {self.type_name}'
         )
 
+    def _milli(self, value: float) -> str:
+        """A hint at millimetres or milliradians, where a thousandth would be within the bounds."""
+        lower = -math.inf if self.lower is None else self.lower
+        upper = math.inf if self.upper is None else self.upper
+        length = re.match('(m|rad)(,|$)', self.unit)
+        fits = length and lower <= 1e-3 * value <= upper
+        return f'; if that is in m{length[1]}, write {1e-3 * value:g}' if length and fits else ''
+
     def _check_element(self, value: object, where: str) -> Any:
         if hasattr(value, 'item') and not isinstance(value, str | bytes):  # a NumPy scalar
             value = value.item()
@@ -119,6 +127,7 @@ class Spec:
             if too_low or too_high:
                 raise ParameterError(
                     f"parameter '{where}' is {value:g}, it must lie in {self.bounds_text}"
+                    f'{self._milli(value)}'
                 )
         if self.choices and value not in self.choices:
             raise ParameterError(f"parameter '{where}' is '{value}', it must be {self.bounds_text}")

@@ -42,7 +42,7 @@ def analyse(path: Path) -> Analysis:
     Raises :class:`~.errors.BagError` when there is no bag, or nothing of a run in it.
     """
     bag = Bag(path)
-    run = _run_parameters(bag)
+    run = run_parameters(bag)
     metrics, curves, joiner = RunMetrics(run), RunCurves(run), Joiner()
     for batch in bag.batches():
         for key, records in batch.samples.items():
@@ -70,7 +70,7 @@ def _changes(folder: Path) -> list[tuple[str, str]]:
     return changes
 
 
-def _run_parameters(bag: Bag) -> RunParameters:
+def run_parameters(bag: Bag) -> RunParameters:
     """The parameters the monitor left in the bag; the defaults when there was no monitor."""
     for batch in bag.batches():
         for status in batch.diagnostics:
