@@ -41,7 +41,7 @@ def requirements(*names: str) -> dict[str, str]:
     return {re.split('[<>=]', line)[0]: line for line in lines if line and not line.startswith('#')}
 
 
-RUN = requirements('requirements.txt')
+RUN = requirements('requirements.txt', 'requirements-view.txt')
 OPTIONAL = requirements('requirements-optional.txt')
 TEST = requirements('requirements-test.txt', 'requirements-test-nodeps.txt')
 ALL = {**RUN, **TEST, **OPTIONAL}
@@ -160,7 +160,11 @@ def needs_of(name: str) -> set[str]:
 
 def test_every_requirement_is_one_of_a_package() -> None:
     imports: set[str] = set().union(*(used(package) for package in PACKAGES))
-    agreed(difference('setup/requirements.txt', set(RUN), distributions(imports) - set(OPTIONAL)))
+    agreed(
+        difference(
+            'setup/requirements{,-view}.txt', set(RUN), distributions(imports) - set(OPTIONAL)
+        )
+    )
 
 
 def test_what_is_optional_is_used_and_tested_as_it_is_installed() -> None:

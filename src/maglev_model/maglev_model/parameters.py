@@ -38,6 +38,10 @@ _NUMBERS = {
 _SCALARS: dict[type, str] = {bool: 'bool', int: 'integer', float: 'double', str: 'string'}
 
 
+DIFFERS = '# not as by default: '
+"""How the lines begin with which :func:`to_yaml` names what was changed."""
+
+
 class ParameterError(ValueError):
     """A parameter is unknown, of the wrong type or out of its bounds; the message names it."""
 
@@ -319,8 +323,18 @@ def from_yaml(cls: type[T], node: str, *paths: str | Path) -> T:
     return build(cls, {k: v for k, v in overrides.items() if not for_others(k, known)})
 
 
+def differing(instance: Any) -> dict[str, tuple[object, object]]:
+    """Value and default of each parameter that is not as by default, by name."""
+    table = specs(type(instance))
+    return {
+        name: (value, table[name].default)
+        for name, value in values(instance).items()
+        if value != table[name].default
+    }
+
+
 def to_yaml(instance: Any, node: str) -> str:
-    """The whole table as a ROS parameter file for one node.
+    """The whole table as a ROS parameter file for one node; first what is not as by default.
 
     But for lists that are empty by default and still are: ROS cannot read an empty list.
     """
@@ -335,7 +349,12 @@ def to_yaml(instance: Any, node: str) -> str:
             level = level.setdefault(part, {})
         level[last] = list(value) if isinstance(value, tuple) else value
     content = {node: {'ros__parameters': nested}}
-    return yaml.dump(content, Dumper=_Dumper, sort_keys=False, default_flow_style=None)
+    lines = [
+        f'{DIFFERS}{name}: {value!r} (by default {default!r})\n'
+        for name, (value, default) in differing(instance).items()
+    ]
+    text = yaml.dump(content, Dumper=_Dumper, sort_keys=False, default_flow_style=None)
+    return ''.join(lines) + str(text)
 
 
 class _Loader(yaml.SafeLoader):
