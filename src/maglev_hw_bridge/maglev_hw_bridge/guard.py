@@ -105,6 +105,19 @@ def _at_rest(g: GuardArrays, i: int) -> bool:
 
 
 @compiled
+def _drift(g: GuardArrays, i: int) -> float:
+    """How far friction may carry what an encoder should read off the model in probation [m]."""
+    if i >= 4:
+        held = g.friction[i - 3]
+    else:
+        held = (
+            g.friction[Y]
+            + machine_from_array(g.machine).r * g.friction[PHI if i % 2 == 0 else THETA]
+        )
+    return float(0.5 * held * (_PROBATION * g.period) ** 2)
+
+
+@compiled
 def _slips(g: GuardArrays) -> bool:
     """Find and put right what leaps; whether there is some."""
     found = False
@@ -112,7 +125,7 @@ def _slips(g: GuardArrays) -> bool:
         step = g.believed[i] - g.past[0, i]
         error = step - g.step[i]
         again = step - (g.past[0, i] - g.past[1, i])
-        away = g.probation[i] == 1 and abs(g.believed[i] - g.length[i]) > g.max_jump
+        away = g.probation[i] == 1 and abs(g.believed[i] - g.length[i]) > g.max_jump + _drift(g, i)
         if g.trust[i] == LOST or (min(abs(error), abs(again)) <= g.max_jump and not away):
             continue
         found, g.blamed[i] = True, 1
