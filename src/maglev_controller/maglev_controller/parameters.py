@@ -10,6 +10,7 @@ import math
 
 from maglev_controller.design.notch import MOST
 from maglev_controller.design.state_space import Mode
+from maglev_controller.learning_parameters import LearningParameters
 from maglev_model.loop_parameters import AxisLoopParameters, FundamentalParameters
 from maglev_model.machine import MachineParameters
 from maglev_model.parameters import ParameterError, group, parameter
@@ -394,6 +395,7 @@ class ControllerParameters:
     friction: FrictionParameters = group(FrictionParameters)
     modes: ModeParameters = group(ModeParameters)
     winding: WindingParameters = group(WindingParameters)
+    learning: LearningParameters = group(LearningParameters)
     y: AxisParameters = group(AxisParameters)
     x: AxisParameters = group(AxisParameters)
     z: AxisParameters = group(AxisParameters)

@@ -243,6 +243,7 @@ def _settings(
     return {
         'machine': machine_to_array(machine_constants(machine)),
         'period': parameters.sample_time,
+        'learns': parameters.learning.period > 0.0,
         'controlled': [axis.controlled for axis in parameters.axes],
         'lower': np.array(machine.lower_limit) - margin,
         'upper': np.array(machine.upper_limit) + margin,
