@@ -236,6 +236,13 @@ class FrictionParameters:
         within=(1e-8, 1.0),
         length=5,
     )
+    initial: tuple[float, ...] = parameter(
+        (0.0, 0.0, 0.0, 0.0, 0.0),
+        'level that it begins with at every enable, per axis',
+        unit='m/s^2, rad/s^2',
+        within=(0.0, 100.0),
+        length=5,
+    )
     largest: tuple[float, ...] = parameter(
         (1.0, 1.0, 1.0, 5.0, 5.0),
         'level that is learned at most, per axis',

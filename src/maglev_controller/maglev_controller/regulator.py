@@ -126,6 +126,7 @@ class Regulator:
         records = self._arrays.records
         records['axes'] = np.zeros((), AXIS)
         records['axes']['fresh'] = True
+        records['axes']['friction'] = self.parameters.friction.initial
         records['sample'] = np.zeros((), SAMPLE)
         self._arrays.xi[:] = 0.0
 
