@@ -73,6 +73,7 @@ class Browser:
 
     def close(self) -> None:
         """End the browser with all its processes."""
+        self._socket.close()
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait(10)
