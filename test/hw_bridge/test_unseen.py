@@ -40,7 +40,9 @@ def pushes(flight: Flight, samples: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize('stuck', [(4,), (5,), (2, 3), (0, 3)])
-def test_until_it_shows_the_platen_could_as_well_be_held_by_friction(stuck: tuple[int, ...]) -> None:
+def test_until_it_shows_the_platen_could_as_well_be_held_by_friction(
+    stuck: tuple[int, ...],
+) -> None:
     flight = hovering(SMOOTH, stuck)
     seen = pushes(flight, 2000)
     off = np.abs(flight.rig.state[[2, 4]]) if stuck[0] >= 4 else flight.rig.state[0] - 0.025
