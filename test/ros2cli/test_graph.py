@@ -67,7 +67,7 @@ def test_echo(ros2: Ros2, small: Process) -> None:
     code, out, err = ros2('topic', 'echo', '--once', '/stage/measurement')
     assert (code, err) == (0, '')
     assert out.startswith('header:\n  stamp:\n    sec: 0\n    nanosec: 0\n  frame_id: stage\nseque')
-    assert out.endswith('wall_time: 0\nlockstep: true\n---\n')
+    assert out.endswith('wall_time: 0\nlockstep: true\ncontroller: 0\n---\n')
     field = ros2('topic', 'echo', '--once', '--field', 'gap', '/stage/measurement').out
     assert field == '[0.03 0.03 0.03 0.03]\n---\n'
     csv = ros2('topic', 'echo', '--once', '--csv', '--field', 'header', '/stage/measurement').out

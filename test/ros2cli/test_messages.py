@@ -56,13 +56,14 @@ def test_yaml(measurement: Any) -> None:
         late_samples: 12
         wall_time: 0
         lockstep: false
+        controller: 0
     """)
 
 
 def test_csv(measurement: Any) -> None:
     assert as_csv(measurement, Form()) == (
         '1795273357,572257960,stage,16616,0.02802,0.022010000000000002,0.028,0.03,0.01812,-0.02391,'
-        '12,0,False'
+        '12,0,False,0'
     )
 
 

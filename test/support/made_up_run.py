@@ -150,7 +150,7 @@ class Encoder:
                 run.position[n, 1],
                 run.position[n, 2],
                 run.late[n],
-                *(() if self._former else (run.stamp[n], self._lockstep)),
+                *(() if self._former else (run.stamp[n], self._lockstep, SESSION)),
             ),
             'currents': (
                 run.direct[n],

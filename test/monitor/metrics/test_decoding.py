@@ -67,11 +67,26 @@ def test_columns_are_what_was_sent(run: Any, messages: dict[str, list[bytes]]) -
 
 def test_former_messages_lack_what_was_added(run: Any) -> None:
     former = Encoder(former=True)
-    for key, added in (('measurement', {'wall_time', 'lockstep'}), ('controller', {'limited_by'})):
+    added_since = {
+        'measurement': {'wall_time', 'lockstep', 'controller'},
+        'controller': {'limited_by'},
+    }
+    for key, added in added_since.items():
         records = decode(key, [former.message(run, key, n) for n in range(3)])
         fields = {field.name for field in TOPIC_TYPES[key].fields}
         assert fields - set(records.dtype.names or ()) == added
         np.testing.assert_array_equal(stamps(records), run.stamp[:3])
+
+
+def test_what_was_added_later_may_be_lacking_alone(run: Any, encoder: Any) -> None:
+    now = decode('measurement', [encoder.message(run, 'measurement', 5)])
+    lockstep = (now.dtype.fields or {})['lockstep'][1]
+    before = encoder.message(run, 'measurement', 5)[: lockstep + 1]
+    for padding in (b'', bytes(3)):
+        records = decode('measurement', [before + padding])
+        assert set(now.dtype.names or ()) - set(records.dtype.names or ()) == {'controller'}
+        assert records['wall_time'] == now['wall_time']
+        assert records['lockstep'] == now['lockstep']
 
 
 def test_messages_before_and_after_a_field_was_added_do_not_mix(run: Any, encoder: Any) -> None:

@@ -18,7 +18,7 @@ from maglev_model.phases import Phase
 from maglev_monitor.bag.reader import Bag, Batch
 from maglev_monitor.metrics.decoding import TOPIC_TYPES, Records
 
-WALL_CLOCK = ('seconds', 'nanoseconds', 'late_samples', 'wall_time', 'session')
+WALL_CLOCK = ('seconds', 'nanoseconds', 'late_samples', 'wall_time', 'session', 'controller')
 """Fields that two runs of the same thing need not share: when it was, and who sent it."""
 
 

@@ -27,7 +27,7 @@ class Field(NamedTuple):
     name: str
     kind: str
     length: int = 1
-    added: bool = False  # at the end of the message; bags from before do not have it
+    added: int = 0  # at the end of the message, with which change; bags from before lack it
 
 
 class TopicType(NamedTuple):
@@ -63,8 +63,9 @@ TOPIC_TYPES = {
                 Field('x', '<f8'),
                 Field('z', '<f8'),
                 Field('late_samples', '<u8'),
-                Field('wall_time', '<u8', added=True),
-                Field('lockstep', '?', added=True),
+                Field('wall_time', '<u8', added=1),
+                Field('lockstep', '?', added=1),
+                Field('controller', '<u8', added=2),
             ),
         ),
         TopicType(
@@ -74,8 +75,8 @@ TOPIC_TYPES = {
                 Field('sequence', '<u8'),
                 Field('direct_current', '<f8', 4),
                 Field('quadrature_current', '<f8', 4),
-                Field('session', '<u8', added=True),
-                Field('status', '<u1', added=True),
+                Field('session', '<u8', added=1),
+                Field('status', '<u1', added=1),
             ),
         ),
         TopicType(
@@ -90,7 +91,7 @@ TOPIC_TYPES = {
                 Field('error_rate', '<f8', 5),
                 Field('virtual_input', '<f8', 5),
                 Field('internal_model', '<f8', 5),
-                Field('limited_by', '<u1', added=True),
+                Field('limited_by', '<u1', added=1),
             ),
         ),
         TopicType(
@@ -182,8 +183,9 @@ def _size(key: str, frame_id_length: int) -> int:
 def _record_type(key: str, frame_id_length: int, size: int) -> np.dtype[np.void]:
     fields: Sequence[Field] = TOPIC_TYPES[key].fields
     offsets, needed = _offsets(fields, frame_id_length)
-    if size < needed:
-        fields = [field for field in fields if not field.added]
+    while size < needed and fields[-1].added:
+        newest = fields[-1].added
+        fields = [field for field in fields if field.added < newest]
         offsets, needed = _offsets(fields, frame_id_length)
     if not needed <= size < needed + 8:
         raise DecodeError(
