@@ -81,11 +81,12 @@ def levitating_at(bag: Path) -> float:
     raise SystemExit('graph: the platen never levitated')
 
 
-def scenario(folder: Path, duration: float) -> tuple[float, float, float]:
+def scenario(folder: Path, duration: float, *options: str) -> tuple[float, float, float]:
     """Run the ellipse: median tick [s], real-time factor, time until it levitates [s]."""
     began = time.time()
+    called = [str(ROOT / 'scenarios' / 'ellipse.sh'), *options]
     done = subprocess.run(
-        [ROOT / 'scenarios' / 'ellipse.sh', '--duration', str(duration), '--out', folder],
+        [*called, '--duration', str(duration), '--out', folder],
         capture_output=True,
         text=True,
     )

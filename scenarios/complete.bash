@@ -19,7 +19,7 @@ _complete_scenario() { # SCRIPT WORD PREVIOUS
     NAME...) words="paper default $(cd "$folder/../params/laws" && printf '%s ' *.yaml)" ;;
     ?*) ;; # a number or a name, which only who types it knows
     '')
-      words=$(sed -nE 's/^  (--[a-z]+) .*/\1/p' <<<"$usage")
+      words=$(sed -nE 's/^  (--[a-z-]+) .*/\1/p' <<<"$usage")
       ((COMP_CWORD > 1)) || words+=" $(sed -nE 's/^  NAME +(.*)/\1/p' <<<"$usage")"
       ;;
   esac

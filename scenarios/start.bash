@@ -19,6 +19,12 @@ if [[ ! -f $root/install/.stamp ]] &&
   ((code == 75)) || exit "$code"
 fi
 
+# What the browser's view needs comes with the first flight that wants it.
+for word; do
+  [[ $word != --view ]] || : "${MAGLEV_SETUP:=view}"
+done
+export MAGLEV_SETUP
+
 # shellcheck source=setup.sh
 . "$root/setup.sh" || exit
 # -S: the packages of .venv take longer to find than all else, and are only needed for overlays.

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Makes the environment of this workspace where it is missing or out of date: .venv, build/,
-# install/. Called by setup.sh; MAGLEV_SETUP=test adds the tools of test/run.sh in
-# .cache/test-tools.
+# install/. Called by setup.sh; MAGLEV_SETUP=view adds to .venv what the live view in the browser
+# needs, MAGLEV_SETUP=test that and the tools of test/run.sh in .cache/test-tools.
 #
 # A part is done when its stamp holds the key of everything it was made from. Stamps are written
 # last and removed first, so whatever ends a set-up, the next run sees what is not finished and
@@ -27,13 +27,15 @@ find_keys() {
   sums=$(sha256sum setup/{requirements{,-build,-ros},constraints-ros}.txt | sha256sum)
   environment_key="1 $branch $ros_prefix $root ${sums%% *}"
   sums=$(sha256sum setup/*.bash src/*/{package.xml,CMakeLists.txt,setup.{py,cfg}} \
-    src/*/{msg,srv}/* | sha256sum)
+    src/*/{msg,srv}/* setup/tf2_msgs/{package.xml,CMakeLists.txt,msg/*} | sha256sum)
   build_key="$environment_key ${sums%% *}"
   # Numba sees a change of a function's own file only, not of what it calls: another cache for each
   # state of the sources, or a run would silently use old code.
   sums=$(find src -regex 'src/maglev_\(model\|plant\|controller\|hw_bridge\|study\)/.*\.py' \
     ! -name node.py -print0 | sort -z | xargs -0r sha256sum | sha256sum)
   sources=${sums:0:16}
+  sums=$(sha256sum setup/requirements-view.txt)
+  view_key="$environment_key ${sums%% *}"
   sums=$(sha256sum setup/requirements-test{,-nodeps}.txt | sha256sum)
   test_key="$environment_key ${sums%% *}"
   shopt -u nullglob
@@ -55,10 +57,14 @@ build_done() {
 compiled() {
   stamped "$cache/numba/current" "$sources" && stamped "$cache/numba/$sources/.stamp" "$build_key"
 }
+view_done() { stamped "$venv/.view-stamp" "$view_key"; }
 test_done() { stamped "$cache/test-tools/.stamp" "$test_key"; }
 
+wants_view() { [[ $wanted == view || $wanted == test ]]; }
+
 everything_done() {
-  environment_done && build_done && compiled && { [[ $wanted != test ]] || test_done; }
+  environment_done && build_done && compiled && { ! wants_view || view_done; } &&
+    { [[ $wanted != test ]] || test_done; }
 }
 
 # What was made for another place names that place throughout, so it is made anew: say why.
@@ -127,6 +133,15 @@ compile() {
   done
 }
 
+make_view() {
+  local versions=$venv/constraints.txt
+  [[ $branch == native ]] || versions=$root/setup/constraints-ros.txt
+  check_space 100 "$root"
+  step 'installing what the live view in the browser needs' \
+    pip_install -r "$root/setup/requirements-view.txt" -c "$versions"
+  stamp "$venv/.view-stamp" "$view_key"
+}
+
 make_test_tools() {
   rm -rf -- "$cache/test-tools" "$cache/test-tools.new"
   step 'installing the test tools' install_test_tools "$cache/test-tools.new"
@@ -159,6 +174,7 @@ main() {
   environment_done || make_environment
   build_done || make_build
   compiled || compile
+  ! wants_view || view_done || make_view
   [[ $wanted != test ]] || test_done || make_test_tools
   say "done in $SECONDS s"
 }

@@ -133,12 +133,22 @@ in_underlay() {
     bash -c "$(underlay)"$'\nexec "$@"' - "$@"
 }
 
+underlay_has() { # PACKAGE
+  in_underlay bash -c 'IFS=: read -ra prefixes <<<"$AMENT_PREFIX_PATH"
+for prefix in "${prefixes[@]}"; do
+  [[ ! -f $prefix/share/$0/package.xml ]] || exit 0
+done
+exit 1' "$1"
+}
+
 build_packages() {
+  local paths=(src)
   cd "$root"
+  underlay_has tf2_msgs || paths+=(setup/tf2_msgs)
   in_underlay "$venv/bin/python" \
     -c 'from colcon_core.command import main; raise SystemExit(main())' \
-    --log-base .cache/colcon build --base-paths src --build-base build --install-base install \
-    --symlink-install --event-handlers console_direct- console_cohesion+ \
+    --log-base .cache/colcon build --base-paths "${paths[@]}" --build-base build \
+    --install-base install --symlink-install --event-handlers console_direct- console_cohesion+ \
     --cmake-args "-DPython3_EXECUTABLE=$venv/bin/python" -DBUILD_TESTING=OFF \
     -DCMAKE_POLICY_VERSION_MINIMUM=3.5 --no-warn-unused-cli
 }
@@ -202,6 +212,7 @@ END
   mkdir -p -- "$cache/numba"
   stamp "$cache/numba/current" "$sources"
   in_environment python -c 'import maglev_msgs.msg, matplotlib, numba, rclpy, rosbags, scipy
+import tf2_msgs.msg
 rclpy.init()
 rclpy.shutdown()'
 }
@@ -253,8 +264,12 @@ stage.close()' &
   in_environment python -c 'import maglev_study.closed_loop as loop
 import maglev_controller.node, maglev_plant.node, maglev_reference.node
 import maglev_monitor.bag.recorder, maglev_monitor.live.node, maglev_monitor.report.run_report
+import maglev_view.forces, maglev_view.node, numpy
+from maglev_model.machine import MachineParameters
 from maglev_reference import parameters, timeline
 loop.warm_up()
-timeline.Timeline(parameters.ReferenceParameters())' || echo 'not compiled'
+timeline.Timeline(parameters.ReferenceParameters())
+level, none = numpy.array([0.025, 0.0, 0.0, 0.0, 0.0]), numpy.zeros(4)
+maglev_view.forces.Forces(MachineParameters()).at(level, none, none)' || echo 'not compiled'
   wait $! || echo 'not compiled'
 }

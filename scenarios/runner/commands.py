@@ -10,7 +10,7 @@ from typing import NoReturn
 
 from runner.console import complain, talk_to, write
 from runner.folder import default_folder
-from runner.graph import Flight, Scenario
+from runner.graph import VIEWS, Flight, Scenario
 from runner.options import (
     Command,
     HelpAskedError,
@@ -44,6 +44,10 @@ NAMESPACE = Option(
     'NS',
     namespace,
 )
+VIEW = {
+    '--view': Option('show the flight live in the browser'),
+    '--no-view': Option('no standard topics for RViz, Foxglove and PlotJuggler'),
+}
 PAPER = {
     'ellipse': "The paper's ellipse in y, x and z: lifts off, follows it for 60 s measured, lands.",
     'ellipse_4dof': "The paper's ellipse with theta turning along: lifts off, follows it for 60 s"
@@ -123,6 +127,7 @@ def _flight_command(name: str, description: str, call: str = '') -> Command:
             overlay,
         ),
         '--namespace': NAMESPACE,
+        **VIEW,
         '--out': _out_option('the run is', name),
         '--quiet': Option('say only what is wrong'),
         '--json': Option(
@@ -148,7 +153,13 @@ def _flight(scenario: Scenario, command: Command, options: Sequence[str]) -> Fli
         overlays=tuple(given.get('--params', ())),
         namespace=where,
         as_json='--json' in given,
+        views=_views(given),
     )
+
+
+def _views(given: Mapping[str, list[str]]) -> tuple[str, ...]:
+    wanted = {'view': '--no-view' not in given, 'web': '--view' in given}
+    return tuple(view for view in VIEWS if wanted[view])
 
 
 def _fly_in_turn(*flights: Flight) -> int:
@@ -200,12 +211,14 @@ def _paper_tables(options: Sequence[str]) -> Job:
     table = {
         '--mode': MODE,
         '--namespace': NAMESPACE,
+        **VIEW,
         '--out': _out_option('runs and page are', name),
         '--quick': Option('short windows: 6 s for each step, 4 s of each ellipse'),
     }
     given = Command(f'{name}.sh', PAPER_TABLES, table).parse(options)
     mode, where = given.get('--mode', ['lockstep'])[-1], given.get('--namespace', [''])[-1]
-    return partial(fly_all, _out(name, given), mode, where, quick='--quick' in given)
+    quick, views = '--quick' in given, _views(given)
+    return partial(fly_all, _out(name, given), mode, where, quick=quick, views=views)
 
 
 def _compare(options: Sequence[str]) -> Job:

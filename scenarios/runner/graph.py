@@ -11,6 +11,10 @@ from runner.process import program
 START_ORDER = ('recorder', 'monitor', 'stage', 'controller', 'reference')
 STOP_ORDER = ('reference', 'controller', 'stage', 'monitor', 'recorder')
 """First no current flows, then the stage ends, then who watches."""
+VIEWS = ('view', 'web')
+"""Who only shows: they start last, end last, and the run does not depend on them."""
+
+_PACKAGES = {'recorder': 'maglev_monitor', 'web': 'maglev_view'}
 
 
 class Scenario(NamedTuple):
@@ -25,7 +29,7 @@ class Flight(NamedTuple):
     """A scenario as the user wants it.
 
     ``duration`` is a text [s], empty for the scenario's own; ``namespace`` an absolute name, empty
-    for none; ``as_json`` prints the outcome.
+    for none; ``as_json`` prints the outcome; ``views`` are those of :data:`VIEWS` that are wanted.
     """
 
     scenario: Scenario
@@ -36,11 +40,12 @@ class Flight(NamedTuple):
     overlays: tuple[str, ...] = ()
     namespace: str = ''
     as_json: bool = False
+    views: tuple[str, ...] = ('view',)
 
     def program(self, node: str) -> list[str]:
         """How to run a node; raises WrongUseError when it is not built."""
         name = self._name(node)
-        return program('maglev_monitor' if name == 'recorder' else f'maglev_{name}', name)
+        return program(_PACKAGES.get(name, f'maglev_{name}'), name)
 
     def arguments(self, node: str) -> list[str]:
         """What a node is told: parameter files, each over the one before, then single values."""
@@ -66,6 +71,8 @@ class Flight(NamedTuple):
     def _values(self, node: str) -> list[str]:
         if node == 'recorder':
             return [f'output:={self.out}/bag']
+        if node in VIEWS:
+            return []
         mode = f'mode:={self.mode}'
         if node == 'monitor':
             output = f'output:={self.out}/metrics.json'

@@ -12,7 +12,17 @@ from runner.options import WrongUseError
 
 ROOT = Path(__file__).resolve().parents[2]
 PARAMS = ROOT / 'params'
-SECTIONS = ('plant', 'hw_bridge', 'controller', 'reference', 'monitor', 'recorder', '**')
+SECTIONS = (
+    'plant',
+    'hw_bridge',
+    'controller',
+    'reference',
+    'monitor',
+    'recorder',
+    'view',
+    'web',
+    '**',
+)
 
 
 def overlay(option: str, name: str) -> str:

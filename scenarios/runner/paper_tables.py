@@ -19,7 +19,7 @@ QUICK = {'steps': '6.0', 'ellipse': '4.0', 'ellipse_4dof': '4.0'}
 """The scenarios, with short windows [s]."""
 
 
-def fly_all(out: Path, mode: str, namespace: str, *, quick: bool) -> int:
+def fly_all(out: Path, mode: str, namespace: str, *, quick: bool, views: tuple[str, ...]) -> int:
     """Fly six runs into a folder and write the page: 0 when all passed, 1 when not, 128 + signal.
 
     Raises WrongUseError before anything is started.
@@ -30,7 +30,7 @@ def fly_all(out: Path, mode: str, namespace: str, *, quick: bool) -> int:
     say(f'paper_tables: {mode}{where}, into {out}')
     signals = Signals()
     failed = []
-    for flight in _flights(out, mode, namespace, quick):
+    for flight in _flights(out, mode, namespace, quick, views):
         name = str(flight.out.relative_to(out))
         say(f'paper_tables: {name}')
         if _attempt(flight, signals):
@@ -48,7 +48,9 @@ def fly_all(out: Path, mode: str, namespace: str, *, quick: bool) -> int:
     return 0
 
 
-def _flights(out: Path, mode: str, namespace: str, quick: bool) -> list[Flight]:
+def _flights(
+    out: Path, mode: str, namespace: str, quick: bool, views: tuple[str, ...]
+) -> list[Flight]:
     return [
         Flight(
             Scenario(scenario, (f'scenario_{scenario}.yaml',)),
@@ -57,6 +59,7 @@ def _flights(out: Path, mode: str, namespace: str, quick: bool) -> list[Flight]:
             duration=duration if quick else '',
             overlays=tuple(str(PARAMS / name) for name in ('benchmark.yaml', *files)),
             namespace=namespace,
+            views=views,
         )
         for controller, files in LAWS.items()
         for scenario, duration in QUICK.items()

@@ -14,6 +14,9 @@ from runner.overlays import check_overlay
 from runner.process import Process, program, run_to_end
 from runner.signals import Signals
 
+TALKERS = ('monitor', 'web')
+"""Nodes of which the terminal shows everything."""
+
 
 def fly(flight: Flight, signals: Signals) -> int:
     """Fly and leave the run in its folder.
@@ -23,7 +26,7 @@ def fly(flight: Flight, signals: Signals) -> int:
     """
     for path in flight.overlays:
         check_overlay(path, flight.namespace)
-    commands = {node: flight.program(node) for node in START_ORDER}
+    commands = {node: flight.program(node) for node in (*START_ORDER, *flight.views)}
     analyze = program('maglev_monitor', 'analyze')
     flight = flight._replace(out=make_folder(flight.out))
     name = flight.scenario.name
@@ -65,9 +68,10 @@ class Run:
         self._name, self._out = flight.scenario.name, flight.out
         self._signals = signals
         self._nodes: dict[str, Process] = {}
+        self._gone: set[str] = set()
         self._logs = {
-            node: NodeLog(f'{self._name}: {node}', self._log(node), everything=node == 'monitor')
-            for node in START_ORDER
+            node: NodeLog(f'{self._name}: {node}', self._log(node), everything=node in TALKERS)
+            for node in (*START_ORDER, *flight.views)
         }
 
     def measure(self, commands: Mapping[str, Sequence[str]]) -> bool:
@@ -76,14 +80,14 @@ class Run:
         Raises OSError when one cannot be started. However it goes, none lives on.
         """
         try:
-            for node in START_ORDER:
+            for node in commands:
                 if self._signals.code:
                     return False
                 command = [*commands[node], *self._flight.arguments(node)]
                 self._nodes[node] = Process(command, self._log(node))
             return self._watch()
         finally:
-            for node in STOP_ORDER:
+            for node in (*STOP_ORDER, *self._flight.views):
                 if node in self._nodes:
                     self._nodes[node].stop(self._pause)
             self._show(rest=True)
@@ -96,7 +100,7 @@ class Run:
     def _watch(self) -> bool:
         while not self._signals.code:
             self._pause(0.1)
-            ended = [node for node, process in self._nodes.items() if process.code is not None]
+            ended = [node for node in START_ORDER if self._nodes[node].code is not None]
             measured = (self._out / 'metrics.json').is_file()
             early = [node for node in ended if node != 'monitor' or not measured]
             for node in early:
@@ -106,7 +110,17 @@ class Run:
                 self._complain(f'its log: {self._log(node)}')
             if ended:
                 return not early
+            self._tell_of_views()
         return False
+
+    def _tell_of_views(self) -> None:
+        """Say that a view has ended, which the flight does not heed."""
+        for node in self._flight.views:
+            code = self._nodes[node].code
+            if code is not None and node not in self._gone:
+                self._gone.add(node)
+                words = self._last_words(node)
+                self._complain(f'{node} ended with exit code {code}, the flight goes on{words}')
 
     def _clean_ends(self) -> bool:
         clean = True

@@ -25,6 +25,15 @@ from maglev_plant.simulation import SimulatedStage
 from maglev_reference.parameters import ReferenceParameters
 from maglev_study.flight import fly
 
+MODULES = (
+    'law.py',
+    'sliding.py',
+    'lqr.py',
+    'boards.py',
+    'path.py',
+    'effort.py',
+    'models.py',
+)
 TEXT = (Path(__file__).resolve().parents[2] / 'docs' / 'extending.md').read_text(encoding='utf-8')
 
 
@@ -43,7 +52,7 @@ def my_stage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 def test_every_module_of_the_page_is_there(my_stage: Path) -> None:
     names = {path.name for path in my_stage.iterdir()}
-    assert names == {'law.py', 'boards.py', 'path.py', 'effort.py', 'models.py'}
+    assert names == set(MODULES)
 
 
 def test_a_law_flies() -> None:
@@ -54,6 +63,15 @@ def test_a_law_flies() -> None:
     default = fly('ellipse', duration=3.0)
     assert 1e-6 < flight.mean_error['y'] < 1e-4
     assert flight.mean_error['y'] != default.mean_error['y']
+
+
+@pytest.mark.parametrize('law', ['sliding', 'lqr'])
+def test_any_object_flies(law: str) -> None:
+    """Both kinds on the benchmark plant, from the stop and back to it."""
+    flight = fly('ellipse_4dof', duration=3.0, controller={'law': f'my_stage.{law}'})
+    for axis in ('y', 'x', 'z', 'theta'):
+        assert 1e-6 < flight.mean_error[axis] < 2e-4
+    assert flight.output[-1, 0] == pytest.approx(0.031, abs=1e-5)
 
 
 def test_a_driver_carries_the_bridge(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 import time
@@ -19,14 +20,32 @@ SOFT = 0.01  # [m/s]
 FAILING = Path(__file__).resolve().parents[1] / 'support' / 'failing_controller.py'
 
 
-def fly(nodes: Nodes, observer: Observer, failing: str = '') -> dict[str, Process]:
+TIRED = """
+class Tired:
+    def reset(self):
+        self.left = 2500
+
+    def step(self, measurement, reference):
+        self.left -= 1
+        error = measurement.position - reference.position
+        rate = measurement.velocity - reference.velocity
+        return reference.acceleration - 1e4 * error - 150.0 * rate + 0 // self.left
+
+def make(parameters):
+    return Tired()
+"""
+
+
+def fly(
+    nodes: Nodes, observer: Observer, failing: str = '', controller: tuple[str, ...] = ()
+) -> dict[str, Process]:
     """Bridge, controller and reference on the ellipse, until it is airborne."""
     graph = {'stage': nodes.start('hw_bridge', WATCHED, params=('hw_bridge.yaml',))}
     if failing:
         command = [sys.executable, str(FAILING), failing, '--ros-args', '-p', WATCHED]
         graph['controller'] = nodes.run('controller', command)
     else:
-        graph['controller'] = nodes.start('controller', WATCHED)
+        graph['controller'] = nodes.start('controller', WATCHED, *controller)
     graph['reference'] = nodes.start('reference', LONG, WATCHED, params=(ELLIPSE,))
     observer.wait(lambda: airborne(observer), timeout=180.0)
     return graph
@@ -94,6 +113,20 @@ def test_where_it_cannot_go_on_the_bridge_lands(nodes: Nodes, watching: Observer
         assert 'the measurement is not finite' in graph['controller'].output
         watching.wait(lambda: watching.newest(CONTROLLER_STATE).mode == ControllerState.FAULT)
     assert graph['stage'].running
+
+
+def test_a_law_of_ones_own_that_fails_is_landed(
+    nodes: Nodes, watching: Observer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / 'my_laws').mkdir()
+    (tmp_path / 'my_laws' / 'tired.py').write_text(TIRED)
+    monkeypatch.setenv('PYTHONPATH', f'{tmp_path}{os.pathsep}{os.environ["PYTHONPATH"]}')
+    graph = fly(nodes, watching, controller=('law:=my_laws.tired',))
+    graph['controller'].wait_for('the law my_laws.tired raised ZeroDivisionError', timeout=120.0)
+    landed_softly(watching)
+    watching.wait(lambda: watching.newest(CONTROLLER_STATE).mode == ControllerState.FAULT)
+    assert 'the law my_laws.tired gives accelerations' in graph['controller'].output
+    assert 'fault' not in graph['stage'].output
 
 
 def test_whoever_else_publishes_currents_is_not_obeyed(nodes: Nodes, watching: Observer) -> None:

@@ -98,6 +98,16 @@ def test_yaml_carries_every_value_unchanged(
     assert parameters.from_yaml(Table, 'plant', path) == table
 
 
+def test_yaml_names_first_what_is_not_as_by_default() -> None:
+    changed = parameters.build(Table, {'magnet.height': 0.05})
+    default = parameters.specs(Table)['magnet.height'].default
+    assert parameters.differing(Table()) == {}
+    assert parameters.differing(changed) == {'magnet.height': (0.05, default)}
+    assert parameters.DIFFERS not in parameters.to_yaml(Table(), 'plant')
+    first = parameters.to_yaml(changed, 'plant').splitlines()[0]
+    assert first == f'{parameters.DIFFERS}magnet.height: 0.05 (by default {default!r})'
+
+
 def test_yaml_has_no_empty_list_by_default_as_ros_cannot_read_one() -> None:
     @dataclass(frozen=True, kw_only=True)
     class Poles:

@@ -41,8 +41,10 @@ def requirements(*names: str) -> dict[str, str]:
     return {re.split('[<>=]', line)[0]: line for line in lines if line and not line.startswith('#')}
 
 
-RUN = requirements('requirements.txt')
-ALL = {**RUN, **requirements('requirements-test.txt', 'requirements-test-nodeps.txt')}
+RUN = requirements('requirements.txt', 'requirements-view.txt')
+OPTIONAL = requirements('requirements-optional.txt')
+TEST = requirements('requirements-test.txt', 'requirements-test-nodeps.txt')
+ALL = {**RUN, **TEST, **OPTIONAL}
 
 
 def used(package: str) -> set[str]:
@@ -126,13 +128,16 @@ def agreed(*differences: str) -> None:
 
 @pytest.mark.parametrize('package', PACKAGES)
 def test_what_the_code_imports(package: str) -> None:
-    imports = used(package)
+    optional = used(package) & set(OPTIONAL)
+    imports = used(package) - optional
     ours = (imports & set(PACKAGES)) - ROS_ONLY
     right = ours | {ALL[name] for name in distributions(imports)}
     required = lines(setup_cfg(package)['options']['install_requires'])
+    extras = lines(setup_cfg(package)['options.extras_require'].get('optional', ''))
     agreed(
         *package_xml(package, 'exec_depend', imports),
         difference('install_requires of setup.cfg', required, right),
+        difference('optional of setup.cfg', extras, {OPTIONAL[name] for name in optional}),
     )
 
 
@@ -155,7 +160,19 @@ def needs_of(name: str) -> set[str]:
 
 def test_every_requirement_is_one_of_a_package() -> None:
     imports: set[str] = set().union(*(used(package) for package in PACKAGES))
-    agreed(difference('setup/requirements.txt', set(RUN), distributions(imports)))
+    agreed(
+        difference(
+            'setup/requirements{,-view}.txt', set(RUN), distributions(imports) - set(OPTIONAL)
+        )
+    )
+
+
+def test_what_is_optional_is_used_and_tested_as_it_is_installed() -> None:
+    imports: set[str] = set().union(*(used(package) for package in PACKAGES))
+    agreed(difference('setup/requirements-optional.txt', set(OPTIONAL), imports & set(OPTIONAL)))
+    assert {name: TEST[name] for name in set(TEST) & set(OPTIONAL)} == {
+        name: OPTIONAL[name] for name in set(TEST) & set(OPTIONAL)
+    }
 
 
 def test_messages() -> None:

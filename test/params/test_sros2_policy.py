@@ -15,6 +15,9 @@ from maglev_node.node import MaglevNode
 from maglev_node.topics import CURRENTS, REFERENCE
 from maglev_plant.node import PlantNode
 from maglev_reference.node import ReferenceNode
+from maglev_view.node import ViewNode
+from maglev_view.web.calls import WISHES
+from maglev_view.web.node import WebNode
 
 POLICY = Path(__file__).resolve().parents[2] / 'params' / 'sros2' / 'policy.xml'
 NODES: dict[str, type[MaglevNode]] = {
@@ -24,6 +27,8 @@ NODES: dict[str, type[MaglevNode]] = {
     'reference': ReferenceNode,
     'monitor': MonitorNode,
     'recorder': RecorderNode,
+    'view': ViewNode,
+    'web': WebNode,
 }
 ROOT = ElementTree.parse(POLICY).getroot()
 PROFILES = {profile.get('node', ''): profile for profile in ROOT.iter('profile')}
@@ -51,7 +56,7 @@ def test_only_the_controller_commands_and_only_operators_call() -> None:
     publishers = {node for node in PROFILES if CURRENTS in allowed(node, 'publish')}
     assert publishers == {'controller'}
     assert {node for node in PROFILES if REFERENCE in allowed(node, 'publish')} == {'reference'}
-    assert {node for node in PROFILES if allowed(node, 'request')} == {'operator'}
+    assert {node for node in PROFILES if allowed(node, 'request')} == {'operator', 'web'}
     for node in PROFILES:
         assert not any('*' in name for kind in ('publish', 'reply') for name in allowed(node, kind))
 
@@ -62,6 +67,18 @@ def test_an_operator_may_call_every_service() -> None:
             assert f'/{node}/{name.removeprefix("~/")}' in allowed('operator', 'request')
 
 
+def test_the_page_may_call_what_its_buttons_need_and_nothing_else() -> None:
+    nodes = {CURRENTS: ('controller',), REFERENCE: ('reference',)}
+    needed = {
+        f'/{node}/{call.service}'
+        for wish in WISHES.values()
+        for call in wish.calls
+        for node in nodes.get(call.topic, ('plant', 'hw_bridge'))
+    }
+    assert allowed('web', 'request') == needed
+    assert needed <= allowed('operator', 'request')
+
+
 def test_every_node_has_an_enclave() -> None:
     enclaves = {
         profile.get('node'): enclave.get('path')
@@ -70,4 +87,5 @@ def test_every_node_has_an_enclave() -> None:
     }
     assert set(enclaves) == {*NODES, 'operator'}
     assert enclaves['plant'] == enclaves['hw_bridge']
+    assert enclaves['web'] == enclaves['operator']
     assert len(set(enclaves.values())) == 5

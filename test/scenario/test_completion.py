@@ -38,6 +38,10 @@ def test_values() -> None:
     assert offered('./scenarios/ellipse.sh', '--duration', '') == set()
 
 
+def test_options_with_a_dash_within() -> None:
+    assert offered('./scenarios/ellipse.sh', '--no') == {'--no-view'}
+
+
 def test_trajectories_come_first() -> None:
     assert offered('./scenarios/trajectory.sh', 'ci') == {'circle'}
     assert offered('./scenarios/trajectory.sh', 'circle', 'ci') == set()

@@ -44,7 +44,7 @@ def test_a_run_that_passes(tree: Tree) -> None:
     assert 'ellipse: passed' in output
     for name in ('report.html', 'metrics.json', 'log'):
         assert f'{tree.out}/{name}' in output
-    assert tree.ended() == ['reference', 'controller', 'plant', 'recorder']
+    assert tree.ended() == ['reference', 'controller', 'plant', 'recorder', 'view']
     assert tree.alive() == []
 
 
@@ -101,7 +101,7 @@ def test_a_signal_stops_the_nodes_in_order(tree: Tree, number: signal.Signals) -
     process.send_signal(number)
     output, _ = process.communicate(timeout=20)
     assert process.returncode == 128 + number, output
-    assert tree.ended() == ['reference', 'controller', 'plant', 'monitor', 'recorder']
+    assert tree.ended() == ['reference', 'controller', 'plant', 'monitor', 'recorder', 'view']
     assert 'interrupted' in output
     assert tree.alive() == []
 
@@ -154,7 +154,7 @@ def test_ros2_run_is_used_where_it_is(tree: Tree) -> None:
     assert code == 0, output
     assert 'maglev_reference reference --ros-args' in (tree.path / 'ros2').read_text()
     assert 'this is not the node' not in output
-    assert tree.ended() == ['reference', 'controller', 'plant', 'recorder']
+    assert tree.ended() == ['reference', 'controller', 'plant', 'recorder', 'view']
     assert tree.alive() == []
 
 

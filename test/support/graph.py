@@ -99,7 +99,7 @@ class Nodes:
 
         ``on`` is what the command begins with that starts it on another host.
         """
-        package = {'recorder': 'maglev_monitor'}.get(name, f'maglev_{name}')
+        package = {'recorder': 'maglev_monitor', 'web': 'maglev_view'}.get(name, f'maglev_{name}')
         command = [*on, executable(package, name), '--ros-args']
         for file in params:
             path = PARAMS / file if (PARAMS / file).exists() else Path(file)

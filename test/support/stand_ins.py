@@ -11,11 +11,11 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-NODES = ('recorder', 'monitor', 'plant', 'controller', 'reference')
+NODES = ('recorder', 'monitor', 'plant', 'controller', 'reference', 'view')
 
 # A node that runs until it is told to end and writes down when it does. What it does instead is in
 # a file named after it, or after it and the folder of the run (monitor@steps): `die`, `stubborn`,
-# `warn`, `fail`, or, for the monitor, the exit code it ends with.
+# `warn`, `fail`, or, for the monitor, the exit code it ends with, or `wait` for a file `enough`.
 STAND_IN = r"""#!/usr/bin/env bash
 name=${0##*/} tree=@TREE@ out='' what=''
 for word; do
@@ -38,6 +38,11 @@ case $what in
     for time in 1.0 2.0; do echo "WARN $time the belt slips"; echo "INFO $time all is well"; done
     echo 'ERROR 3.0 the belt: broke'
     printf 'ERROR 4.0 no end' >&2
+    ;;
+  wait)
+    while [[ ! -e $tree/enough ]]; do sleep 0.02; done
+    echo '{}' >"$out/metrics.json"
+    exit 0
     ;;
   [0-9]) sleep 0.3; echo 'y 3.0 um'; echo '{}' >"$out/metrics.json"; exit "$what" ;;
 esac
@@ -134,7 +139,7 @@ class Tree:
         return [file.name for file in (self.path / 'pids').iterdir() if file.read_text().strip()]
 
     def wait_started(self, *names: str) -> None:
-        """Wait until these are up, or all five nodes."""
+        """Wait until these are up, or all nodes."""
         deadline = time.monotonic() + 30.0
         while not set(names or NODES) <= set(self.started()):
             assert time.monotonic() < deadline, self.started()

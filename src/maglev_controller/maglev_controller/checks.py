@@ -39,6 +39,25 @@ def check_inverse(parameters: ControllerParameters, *, linear: bool) -> None:
         )
 
 
+def check_foreign(parameters: ControllerParameters) -> None:
+    """Refuse what the law that lands in place of somebody else's has not, and too much time."""
+    if parameters.inverse == 'equilibrium':
+        raise ParameterError(
+            "parameter 'inverse' is 'equilibrium', but the regulator lands by itself when the law "
+            f"'{parameters.law}' fails, and for that takes 'exact' or 'simplified'"
+        )
+    if parameters.learning.period > 0.0:
+        raise ParameterError(
+            f"parameter 'learning.period' is {parameters.learning.period:g} s, but what is learned "
+            f"is fed forward by the regulator's own laws, not by '{parameters.law}': it takes 0"
+        )
+    if parameters.foreign.time > parameters.sample_time:
+        raise ParameterError(
+            f"parameter 'foreign.time' is {parameters.foreign.time:g} s, it must not be more than "
+            f"'sample_time' ({parameters.sample_time:g} s)"
+        )
+
+
 def check_compensator(parameters: ControllerParameters) -> None:
     """Refuse what belongs to the internal model and means nothing to a compensator."""
     if parameters.internal_model.antiwindup == 'paper':

@@ -90,7 +90,8 @@ AXIS: Final = np.dtype(
         ('reference_position', 'f8'),  # of the last sample
         ('reference_velocity', 'f8'),
         ('reference_acceleration', 'f8'),
-        ('smooth_velocity', 'f8'),  # of the reference with jumps made good
+        ('smooth_position', 'f8'),  # of the reference with jumps made good
+        ('smooth_velocity', 'f8'),
         ('transition_duration', 'f8'),  # of what makes a jump good [s]
         ('transition_elapsed', 'f8'),
         ('transition_position', 'f8'),  # at its start

@@ -36,7 +36,7 @@ class DesignProcess:
         """Begin to design for ``parameters`` a successor of ``regulator``."""
         self._input = tempfile.TemporaryFile()  # noqa: SIM115 - they live as long as the process
         self._output = tempfile.TemporaryFile()  # noqa: SIM115
-        pickle.dump((regulator, parameters), self._input)
+        pickle.dump((regulator.arrays, parameters), self._input)
         self._input.seek(0)
         self._begun = time.monotonic()
         self._process = subprocess.Popen(
@@ -69,10 +69,11 @@ class DesignProcess:
 
 def main() -> None:
     """Design what is asked for on stdin, and write it to stdout."""
-    previous, parameters = pickle.load(sys.stdin.buffer)
+    arrays, parameters = pickle.load(sys.stdin.buffer)
     try:
         regulator = Regulator(parameters)
-        outcome = regulator, model_maps(previous.arrays, regulator.arrays)
+        outcome = regulator, model_maps(arrays, regulator.arrays)
+        regulator.foreign = None  # that is for the process that flies to make, or to keep
         sys.stdout.buffer.write(pickle.dumps(outcome))
     except ParameterError as error:
         sys.stdout.buffer.write(pickle.dumps(error))

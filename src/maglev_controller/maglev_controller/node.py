@@ -78,8 +78,12 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
 
     def __init__(self) -> None:
         super().__init__('controller', ControllerNodeParameters)
-        self.supervisor = Supervisor(self._law(self.parameters), enabled=self.parameters.enabled)
         self._lockstep = self.parameters.mode == 'lockstep'
+        self.supervisor = Supervisor(
+            self._law(self.parameters),
+            enabled=self.parameters.enabled,
+            hurried=not self._lockstep,
+        )
         self._longest_gap = self.parameters.measurement_timeout / self.parameters.sample_time
         self._sequence = -1
         self._pending: Measurement | None = None
@@ -348,7 +352,10 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
     def diagnose(self) -> tuple[bytes, str, Mapping[str, object]]:
         """ERROR in a fault and in a landing nobody asked for."""
         supervisor = self.supervisor
-        facts = {'mode': supervisor.mode.name, 'sequence': self._sequence}
+        facts: dict[str, object] = {'mode': supervisor.mode.name, 'sequence': self._sequence}
+        foreign = supervisor.regulator.foreign
+        if foreign is not None:
+            facts['law_longest_time'], facts['law_too_long'] = foreign.worst, foreign.late
         failed = supervisor.mode in (Mode.FAULT, Mode.LANDING) or 'landed' in supervisor.reason
         if failed and 'disabled' not in supervisor.reason:
             return DiagnosticStatus.ERROR, f'{supervisor.mode.name}: {supervisor.reason}', facts

@@ -10,6 +10,7 @@ import math
 
 from maglev_controller.design.notch import MOST
 from maglev_controller.design.state_space import Mode
+from maglev_controller.foreign_law import ForeignLawParameters
 from maglev_controller.learning_parameters import LearningParameters
 from maglev_model.loop_parameters import AxisLoopParameters, FundamentalParameters
 from maglev_model.machine import MachineParameters
@@ -377,6 +378,7 @@ class ControllerParameters:
         'control law, how e becomes w: a module of maglev_controller.laws by its name, or '
         'any other by its dotted path',
     )
+    foreign: ForeignLawParameters = group(ForeignLawParameters)
     inverse: str = parameter(
         'exact',
         "simplified: the paper's (8), (12); exact: per motor through the quadratic (2); "

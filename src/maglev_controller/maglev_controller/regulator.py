@@ -9,14 +9,16 @@ kick. With feed-forward, w also holds the reference's acceleration.
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from maglev_controller.bumpless_transfer import ModelMaps, carry_over, check_retuning, model_maps
+from maglev_controller.checks import check_foreign
 from maglev_controller.control_arrays import (
     AXIS,
     INVERSES,
@@ -30,7 +32,15 @@ from maglev_controller.design.axis_design import AxisDesign
 from maglev_controller.design.margins import LoopMargins, all_margins, check_margins
 from maglev_controller.design.observer import NO_OBSERVER
 from maglev_controller.estimation import DOUBT
-from maglev_controller.laws import control_law
+from maglev_controller.foreign_law import ForeignLaw, Law
+from maglev_controller.foreign_sample import (
+    TOLD,
+    close_by_itself,
+    close_with_currents,
+    close_with_input,
+    open_sample,
+)
+from maglev_controller.laws import control_law, find_law
 from maglev_controller.parameters import ControllerParameters, EncoderParameters
 from maglev_controller.rest import FADING_TIME as REST_FADING_TIME
 from maglev_controller.sample_step import (
@@ -44,6 +54,7 @@ from maglev_controller.voltage import winding_settings
 from maglev_model.axes import AXES, FloatArray
 from maglev_model.machine import machine_constants
 from maglev_model.machine_array import machine_to_array
+from maglev_model.parameters import replace
 
 FADING_TIME = 0.05
 """Time constant of the bump, the part of w that bridges a change of gains in flight [s]."""
@@ -58,19 +69,48 @@ class Regulator:
 
     Readable after a step, (5,) each, in place: ``position`` [m, rad], ``error``, ``error_rate``,
     ``virtual_input`` w [m/s², rad/s²] and ``internal_model``, the internal model's part of w.
+
+    Where the parameter ``law`` names an object of somebody else's, it is :attr:`foreign`, and its
+    answers are taken in place of the regulator's own until it fails, or :meth:`fall_back`.
     """
 
-    def __init__(self, parameters: ControllerParameters) -> None:
-        """Design all axes. Raises ``ParameterError`` with the reason for what cannot be had."""
+    def __init__(self, parameters: ControllerParameters, law: Law | None = None) -> None:
+        """Design all axes; with ``law`` that object answers, and what is designed lands.
+
+        Raises ``ParameterError`` with the reason for what cannot be had.
+        """
         self.parameters = parameters
-        law = control_law(parameters)
-        self.designs: tuple[AxisDesign, ...] = tuple(law.design(parameters, name) for name in AXES)
+        self._given = law
+        chosen = control_law(parameters)
+        if law is not None:
+            check_foreign(parameters)
+        if (
+            law is not None or chosen.make is not None
+        ):  # what runs along has to follow what acts in its place
+            parameters = replace(parameters, {'internal_model.antiwindup': 'observer'})
+        self.designs: tuple[AxisDesign, ...] = tuple(
+            chosen.design(parameters, name) for name in AXES
+        )
         self.margins: tuple[LoopMargins, ...] = all_margins(parameters, self.designs)
         for name, margins, axis in zip(AXES, self.margins, parameters.axes, strict=True):
             if axis.controlled:
                 check_margins(parameters, margins, name)
         self._use(_control_arrays(parameters, self.designs))
+        self.make_foreign()
         self.reset()
+
+    def make_foreign(self) -> None:
+        """Make :attr:`foreign` anew, None for a law of the regulator's own.
+
+        Raises ``ParameterError`` when that cannot be made.
+        """
+        given, make = self._given, find_law(self.parameters.law).make
+        if given is not None:
+            self.foreign: ForeignLaw | None = ForeignLaw(
+                lambda _: given, self.parameters, type(given).__name__
+            )
+        else:
+            self.foreign = None if make is None else ForeignLaw(make, self.parameters)
 
     def _use(self, arrays: ControlArrays) -> None:
         self._arrays = arrays
@@ -83,11 +123,12 @@ class Regulator:
 
     def __getstate__(self) -> tuple[Any, ...]:
         """What goes to another process; the readable arrays are views and made again there."""
-        return self.parameters, self.designs, self.margins, self._arrays
+        given = self._given, self.foreign
+        return self.parameters, self.designs, self.margins, self._arrays, *given
 
     def __setstate__(self, state: tuple[Any, ...]) -> None:
         """Come back from another process."""
-        self.parameters, self.designs, self.margins, arrays = state
+        self.parameters, self.designs, self.margins, arrays, self._given, self.foreign = state
         self._use(arrays)
 
     @property
@@ -98,7 +139,18 @@ class Regulator:
     def describe_loops(self) -> list[str]:
         """Margins and poles of the sampled closed loop, one line for each axis under control."""
         axes = zip(AXES, self.margins, self.parameters.axes, strict=True)
-        return [margins.text(name) for name, margins, axis in axes if axis.controlled]
+        lines = [] if self.foreign is None else [self.foreign.describe()]
+        return lines + [margins.text(name) for name, margins, axis in axes if axis.controlled]
+
+    @property
+    def fault(self) -> str:
+        """Why somebody else's law is not asked any more, or ''."""
+        return '' if self.foreign is None else self.foreign.fault
+
+    def fall_back(self, reason: str) -> None:
+        """Answer by the regulator's own law from now on, until :meth:`reset`."""
+        if self.foreign is not None and not self.foreign.fault:
+            self.foreign.fault = reason
 
     def retuned(self, parameters: ControllerParameters) -> Regulator:
         """A regulator with other parameters that goes on in flight where this one is.
@@ -120,6 +172,9 @@ class Regulator:
         if maps is None:
             maps = model_maps(previous.arrays, self._arrays)
         carry_over(previous.arrays, self._arrays, maps)
+        self.foreign = previous.foreign
+        if self.foreign is not None:
+            self.foreign.parameters = self.parameters
 
     def reset(self) -> None:
         """Internal models at rest, observers and filters to start anew: do at every enable."""
@@ -129,14 +184,17 @@ class Regulator:
         records['axes']['friction'] = self.parameters.friction.initial
         records['sample'] = np.zeros((), SAMPLE)
         self._arrays.xi[:] = 0.0
+        if self.foreign is not None:
+            self.foreign.reset()
 
-    def save(self) -> tuple[NDArray[Any], ...]:
+    def save(self) -> tuple[Any, ...]:
         """What is remembered from sample to sample, for :meth:`restore`."""
-        return self._arrays.axes.copy(), self._arrays.xi.copy()
+        return self._arrays.axes.copy(), self._arrays.xi.copy(), copy.deepcopy(self.foreign)
 
-    def restore(self, saved: tuple[NDArray[Any], ...]) -> None:
+    def restore(self, saved: tuple[Any, ...]) -> None:
         """Go back to what was saved."""
-        self._arrays.axes[:], self._arrays.xi[:] = saved
+        self._arrays.axes[:], self._arrays.xi[:], foreign = saved
+        self.foreign = copy.deepcopy(foreign)
 
     def step(
         self,
@@ -158,8 +216,12 @@ class Regulator:
 
         Raises :class:`MeasurementFault` when measurement or reference is not finite, out of the
         stops' range or contradicts itself; both outputs are then zero and the regulator's state is
-        as before.
+        as before. When somebody else's law fails, :attr:`fault` says so and the answer is the
+        regulator's own.
         """
+        if self.foreign is not None:
+            reference = position, velocity, acceleration
+            return self._ask(self.foreign, gap, x, z, reference, direct_out, quadrature_out)
         code = answer_sample(
             *self._arrays,
             gap,
@@ -174,6 +236,30 @@ class Regulator:
         if code >= FIRST_FAULT:
             raise MeasurementFault(self.describe(code, gap, x, z))
         return code
+
+    def _ask(
+        self,
+        law: ForeignLaw,
+        gap: FloatArray,
+        x: float,
+        z: float,
+        reference: tuple[FloatArray, FloatArray, FloatArray],
+        direct: FloatArray,
+        quadrature: FloatArray,
+    ) -> int:
+        """:meth:`step` with somebody else's law."""
+        told = np.empty((TOLD, 5))
+        code = open_sample(*self._arrays, gap, x, z, *reference, told)
+        if code >= FIRST_FAULT:
+            direct[:] = quadrature[:] = 0.0
+            raise MeasurementFault(self.describe(code, gap, x, z))
+        answer = law.ask(gap, x, z, told)
+        if answer is None:
+            return close_by_itself(*self._arrays, direct, quadrature)
+        if law.gives_currents:
+            direct[:], quadrature[:] = answer
+            return close_with_currents(*self._arrays, direct, quadrature)
+        return close_with_input(*self._arrays, answer, direct, quadrature)
 
     def describe(self, code: int, gap: FloatArray, x: float, z: float) -> str:
         """What a fault code of ``control_step`` means for the measurement it came from."""

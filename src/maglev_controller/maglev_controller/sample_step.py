@@ -109,7 +109,7 @@ def _follow_jump(
 
 
 @compiled
-def _model_parts(control: ControlArrays, sample: Record) -> None:
+def model_parts(control: ControlArrays, sample: Record) -> None:
     """What the internal models of all axes add to w: κ ξ."""
     for index in range(5):
         part = 0.0
@@ -149,7 +149,7 @@ def _virtual_input(
     note_motion(settings, axis, position, smooth_velocity)
     axis.reference_position, axis.reference_velocity = position, velocity
     axis.reference_acceleration = acceleration
-    axis.smooth_velocity = smooth_velocity
+    axis.smooth_position, axis.smooth_velocity = position + to_position, smooth_velocity
     axis.wanted_acceleration = to_acceleration + acceleration
     error = measured - position - to_position
     sample.learned_error[index] = clip(error, settings.learned_error[index])
@@ -204,7 +204,7 @@ def _lost(settings: Record, sample: Record, index: int) -> float:
 
 
 @compiled
-def _advance_models(control: ControlArrays, settings: Record, sample: Record) -> None:
+def advance_models(control: ControlArrays, settings: Record, sample: Record) -> None:
     """ξ⁺ = Φ_d ξ + N_d e + E_d (what was realised less what was wanted), (14), (17)."""
     models, transition, xi = control.models, control.transition, control.xi
     axes = control.records[0].axes
@@ -227,49 +227,78 @@ def _advance_models(control: ControlArrays, settings: Record, sample: Record) ->
 
 
 @compiled
-def control_step(
-    control: ControlArrays, reading: Reading, reference: Reference, currents: Currents
+def measure(
+    settings: Record, machine: Machine, sample: Record, reading: Reading, reference: Reference
 ) -> int:
-    """One sample; see ``Regulator.step``. Returns a code; on a fault only the currents change."""
-    records = control.records[0]
-    settings, sample = records.settings, records.sample
-    machine = machine_from_array(settings.machine)
+    """The outputs of a reading, and whether they and the reference can be used: a code."""
     output = sample.output
     warp = outputs_from_gaps(machine, reading.gap, reading.x, reading.z, output)
     if settings.floored:
         output[0] += settings.half_gap
         output[1] += settings.half_horizontal
         output[2] += settings.half_horizontal
-    code = _check(settings, output, warp, reference)
-    if code != OK:
-        for motor in range(4):
-            currents.direct[motor] = 0.0
-            currents.quadrature[motor] = 0.0
-        return code
-    _model_parts(control, sample)
-    surprises(settings, machine, records.axes, reading)
+    return _check(settings, output, warp, reference)
+
+
+@compiled
+def virtual_inputs(settings: Record, sample: Record, axes: Record, reference: Reference) -> None:
+    """w of all axes; internal models and what surprises the observers are known."""
     for index in range(5):
-        sample.position[index] = output[index]
+        sample.position[index] = sample.output[index]
         _virtual_input(
             settings,
             sample,
-            records.axes[index],
+            axes[index],
             index,
             reference.position[index],
             reference.velocity[index],
             reference.acceleration[index],
         )
+
+
+@compiled
+def currents_of_w(
+    settings: Record, machine: Machine, sample: Record, axes: Record, currents: Currents
+) -> int:
+    """Currents for the sample's w, and what they realise of it; what limited them."""
     direct, quadrature = currents.direct, currents.quadrature
     limited_by = _currents(settings, machine, sample, direct, quadrature)
     if limited_by == 0:
         sample.realised[:] = sample.virtual_input
-    if keep_within_voltage(settings, machine, sample, records.axes, direct, quadrature):
+    if keep_within_voltage(settings, machine, sample, axes, direct, quadrature):
         limited_by |= CURRENT
+    return limited_by
+
+
+@compiled
+def learn(settings: Record, sample: Record, axes: Record) -> None:
+    """Take what is realised at the sample into observers and friction."""
     for index in range(5):
         if settings.observed[index]:
-            predict(settings, records.axes[index], sample.realised[index])
-        learn_friction(settings, records.axes[index], index, sample.realised[index])
-    _advance_models(control, settings, sample)
+            predict(settings, axes[index], sample.realised[index])
+        learn_friction(settings, axes[index], index, sample.realised[index])
+
+
+@compiled
+def control_step(
+    control: ControlArrays, reading: Reading, reference: Reference, currents: Currents
+) -> int:
+    """One sample; see ``Regulator.step``. Returns a code; on a fault only the currents change."""
+    records = control.records[0]
+    settings, sample, axes = records.settings, records.sample, records.axes
+    machine = machine_from_array(settings.machine)
+    code = measure(settings, machine, sample, reading, reference)
+    if code != OK:
+        for motor in range(4):
+            currents.direct[motor] = 0.0
+            currents.quadrature[motor] = 0.0
+        return code
+    model_parts(control, sample)
+    surprises(settings, machine, axes, reading)
+    virtual_inputs(settings, sample, axes, reference)
+    limited_by = currents_of_w(settings, machine, sample, axes, currents)
+    learn(settings, sample, axes)
+    advance_models(control, settings, sample)
     return limited_by
 
 

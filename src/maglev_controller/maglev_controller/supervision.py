@@ -31,8 +31,13 @@ class Supervisor:
     learns while the reference tracks, None where nothing repeats.
     """
 
-    def __init__(self, parameters: ControllerParameters, *, enabled: bool = True) -> None:
-        """Raises ParameterError when the regulator cannot be designed, or the learning."""
+    def __init__(
+        self, parameters: ControllerParameters, *, enabled: bool = True, hurried: bool = False
+    ) -> None:
+        """With ``hurried`` the stage does not wait for an answer, so that a law can be late.
+
+        Raises ParameterError when the regulator cannot be designed, or the learning.
+        """
         self.parameters = parameters
         self.regulator = Regulator(parameters)
         self.learning = iterative_learning(parameters)
@@ -50,8 +55,13 @@ class Supervisor:
         self._may_lift_off = False  # a reference in flight is not followed from its middle
         self._segment = -1
         self._lower_stop = parameters.machine.gap_max
-
+        self._hurried = hurried
+        self._hurry()
         self._warm_up()
+
+    def _hurry(self) -> None:
+        if self.regulator.foreign is not None:
+            self.regulator.foreign.hurried = self._hurried
 
     def _warm_up(self) -> None:
         """Compile, or load what was compiled, before the first sample asks for it."""
@@ -87,16 +97,20 @@ class Supervisor:
     def adopt(self, regulator: Regulator, maps: ModelMaps) -> None:
         """Go on with another regulator, in flight without a jump of its output.
 
-        Raises ParameterError when it flies by now and that cannot change in flight.
+        Raises ParameterError when it flies by now and that cannot change in flight, or when
+        somebody else's law cannot be made.
         """
         if self.flying:
             check_retuning(self.parameters, regulator.parameters)
             regulator.take_over(self.regulator, maps)
-        elif self.learning is not None:
-            self.learning = self.learning.redesigned(regulator.parameters)
+        else:
+            regulator.make_foreign()
+            if self.learning is not None:
+                self.learning = self.learning.redesigned(regulator.parameters)
         self.regulator, self.parameters = regulator, regulator.parameters
         self._platen_watch = PlatenWatch(regulator.parameters)
         self._lower_stop = regulator.parameters.machine.gap_max
+        self._hurry()
 
     def enable(self) -> tuple[bool, str]:
         """Follow the reference from its next lift-off on; refused while a fault is latched."""
@@ -216,12 +230,15 @@ class Supervisor:
             references.acceleration[row],
             references.phase[row] == Phase.TRACK,
         )
+        if self.regulator.fault and self.mode == Mode.REGULATING:
+            self.stop(self.regulator.fault)
         lost = self._platen_watch.step(self.regulator.position, self.regulator.error)
         if lost and self.mode == Mode.REGULATING:
             self._land(lost)
 
     def _land(self, reason: str) -> None:
         references, row = self.references, self._row
+        self.regulator.fall_back(reason)
         self.mode, self.reason, self._after_landing = Mode.LANDING, reason, Mode.DISABLED
         self._landing = Landing(
             self.parameters,

@@ -38,6 +38,10 @@ _NUMBERS = {
 _SCALARS: dict[type, str] = {bool: 'bool', int: 'integer', float: 'double', str: 'string'}
 
 
+DIFFERS = '# not as by default: '
+"""How the lines begin with which :func:`to_yaml` names what was changed."""
+
+
 class ParameterError(ValueError):
     """A parameter is unknown, of the wrong type or out of its bounds; the message names it."""
 
@@ -100,6 +104,14 @@ class Spec:
             f' its type is {self.type_name}'
         )
 
+    def _milli(self, value: float) -> str:
+        """A hint at millimetres or milliradians, where a thousandth would be within the bounds."""
+        lower = -math.inf if self.lower is None else self.lower
+        upper = math.inf if self.upper is None else self.upper
+        length = re.match('(m|rad)(,|$)', self.unit)
+        fits = length and lower <= 1e-3 * value <= upper
+        return f'; if that is in m{length[1]}, write {1e-3 * value:g}' if length and fits else ''
+
     def _check_element(self, value: object, where: str) -> Any:
         if hasattr(value, 'item') and not isinstance(value, str | bytes):  # a NumPy scalar
             value = value.item()
@@ -115,6 +127,7 @@ class Spec:
             if too_low or too_high:
                 raise ParameterError(
                     f"parameter '{where}' is {value:g}, it must lie in {self.bounds_text}"
+                    f'{self._milli(value)}'
                 )
         if self.choices and value not in self.choices:
             raise ParameterError(f"parameter '{where}' is '{value}', it must be {self.bounds_text}")
@@ -310,8 +323,18 @@ def from_yaml(cls: type[T], node: str, *paths: str | Path) -> T:
     return build(cls, {k: v for k, v in overrides.items() if not for_others(k, known)})
 
 
+def differing(instance: Any) -> dict[str, tuple[object, object]]:
+    """Value and default of each parameter that is not as by default, by name."""
+    table = specs(type(instance))
+    return {
+        name: (value, table[name].default)
+        for name, value in values(instance).items()
+        if value != table[name].default
+    }
+
+
 def to_yaml(instance: Any, node: str) -> str:
-    """The whole table as a ROS parameter file for one node.
+    """The whole table as a ROS parameter file for one node; first what is not as by default.
 
     But for lists that are empty by default and still are: ROS cannot read an empty list.
     """
@@ -326,7 +349,12 @@ def to_yaml(instance: Any, node: str) -> str:
             level = level.setdefault(part, {})
         level[last] = list(value) if isinstance(value, tuple) else value
     content = {node: {'ros__parameters': nested}}
-    return yaml.dump(content, Dumper=_Dumper, sort_keys=False, default_flow_style=None)
+    lines = [
+        f'{DIFFERS}{name}: {value!r} (by default {default!r})\n'
+        for name, (value, default) in differing(instance).items()
+    ]
+    text = yaml.dump(content, Dumper=_Dumper, sort_keys=False, default_flow_style=None)
+    return ''.join(lines) + str(text)
 
 
 class _Loader(yaml.SafeLoader):

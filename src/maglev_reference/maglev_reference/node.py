@@ -12,6 +12,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import Trigger
 
 from maglev_model.axes import FloatArray
+from maglev_model.controller_watch import NOBODY
 from maglev_model.geometry import outputs_of_gaps
 from maglev_model.modes import Mode
 from maglev_model.parameters import parameter
@@ -35,6 +36,7 @@ from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.run import ReferenceRun
 from maglev_reference.timeline import Timeline
 
+_LOOK_PERIOD = 0.25  # between two looks at the graph while the stage is flown [s]
 _REMINDER = 5.0  # between two lines about what is waited for [s]
 _IDLE_PERIOD = 0.02  # from one sample to the next while nothing shall move, in lockstep [s]
 _NEWS_TIME = 0.2  # in which an answer shows what a call has changed in the controller [s]
@@ -96,7 +98,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         self._graph.claim(REFERENCE, 'reference')
         self._run = ReferenceRun(self.parameters, self.parameters.lead, self.parameters.autostart)
         self._watchers = Watchers(self, self.parameters.watchers)
-        self._seen = self._reminded = time.monotonic()
+        self._seen = self._reminded = self._looked = time.monotonic()
         self._message = Reference()
         self._message.header.frame_id = 'stage'
         self._publisher = self.create_publisher(Reference, REFERENCE, reference_qos())
@@ -142,10 +144,23 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
     def _wait(self, news: bool) -> None:
         # In real time nobody waits for the controller but us; in lockstep it waits for us.
         answered = self._lockstep or self._run.controller is not None
-        if news and answered and not self._watchers.missing(REFERENCE):
+        if news and self._flown:
+            self._leave_if_another()
+        if news and answered and not self._flown and not self._watchers.missing(REFERENCE):
             self._start()
         else:
             self._remind()
+
+    @property
+    def _flown(self) -> bool:
+        """Whether currents flow: the platen comes down, or somebody flies it already."""
+        return self._measured is not None and self._measured.controller != NOBODY
+
+    def _leave_if_another(self) -> None:
+        """End when the graph shows who flies the stage; on a busy machine that takes its time."""
+        if time.monotonic() - self._looked > _LOOK_PERIOD:
+            self._looked = time.monotonic()
+            self._graph.alone()
 
     def _remind(self) -> None:
         if time.monotonic() - self._reminded > _REMINDER:
@@ -159,6 +174,8 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
             return f'waiting for {", ".join(missing)} to subscribe to {where}'
         if self._measurements.publisher_count() == 0:
             return f'waiting for a stage on {self._measurements.topic}'
+        if self._flown:
+            return 'waiting for the stage to come to rest'
         return f'waiting for a controller on {self._states.topic}'
 
     def _position(self) -> FloatArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,10 @@ from maglev_plant.encoder import encode
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
 from maglev_study.references import References
+
+
+class LawFault(RuntimeError):  # noqa: N818
+    """A law of somebody else's failed; the message says at which sample and how."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -123,6 +128,42 @@ def _loop(
     return int(position.shape[0])
 
 
+class _Rows(NamedTuple):
+    """Where the samples of a run are written, (n, ...) each."""
+
+    state: FloatArray
+    reading: FloatArray
+    own: FloatArray
+    current: FloatArray
+    code: NDArray[np.int8]
+
+
+def _asking_loop(
+    regulator: Regulator, stage: StageArrays, references: References, rows: _Rows, delayed: bool
+) -> None:
+    """:func:`_loop` with a law of somebody else's, which Python asks for each sample."""
+    block, reading, sensor = stage.block, stage.reading, stage.effects.sensor
+    answer = np.zeros(8)
+    for k, reference in enumerate(zip(*references, strict=True)):
+        rows.state[k] = stage.state
+        encode(block)
+        rows.reading[k] = reading
+        if sensor.on:
+            rows.own[k] = sensor.own
+        gap, x, z = reading[:4], reading.item(4), reading.item(5)
+        try:
+            rows.code[k] = regulator.step(gap, x, z, *reference, answer[:4], answer[4:])
+        except MeasurementFault as fault:
+            raise MeasurementFault(f'sample {k}: {fault}') from fault
+        if regulator.fault:
+            raise LawFault(f'sample {k}: {regulator.fault}')
+        if delayed:
+            advance(block)
+        stage.command[:] = rows.current[k] = answer
+        if not delayed:
+            advance(block)
+
+
 def run(
     regulator: Regulator,
     stage: SimulatedStage,
@@ -137,8 +178,9 @@ def run(
     With ``delayed`` the currents take effect one sample late, as in real time. Otherwise this is
     bit for bit what :meth:`Regulator.step` and the stage's ``read`` and ``write`` give in turn.
     ``learning`` learns at the samples that ``follows`` (n,) tells, by default all.
-    Raises ValueError for references of another shape than (n, 5), and :class:`MeasurementFault`,
-    naming the sample, when the regulator refuses one.
+    Raises ValueError for references of another shape than (n, 5), and, naming the sample,
+    :class:`MeasurementFault` when the regulator refuses one, :class:`LawFault` when a law of
+    somebody else's fails: what nodes land upon.
     """
     position, velocity, acceleration = (
         np.ascontiguousarray(array, dtype=np.float64) for array in references
@@ -150,25 +192,28 @@ def run(
     state, current = np.empty((n, 10)), np.empty((n, 8))
     reading, own = np.empty((n, 6)), np.empty((n, 6))
     code = np.zeros(n, dtype=np.int8)
-    arrays = stage.arrays
-    done = _loop(
-        regulator.arrays,
-        arrays.block,
-        position,
-        velocity,
-        acceleration,
-        state,
-        reading,
-        own,
-        current,
-        code,
-        delayed,
-        NO_LEARNING if learning is None else learning.arrays,
-        _following(learning, follows, n),
-    )
-    if done < n:
-        gap, x, z = arrays.reading[:4], float(arrays.reading[4]), float(arrays.reading[5])
-        raise MeasurementFault(f'sample {done}: {regulator.describe(int(code[done]), gap, x, z)}')
+    arrays, rows = stage.arrays, _Rows(state, reading, own, current, code)
+    references = References(position, velocity, acceleration)
+    if regulator.foreign is None:
+        done = _loop(
+            regulator.arrays,
+            arrays.block,
+            *references,
+            rows.state,
+            rows.reading,
+            rows.own,
+            rows.current,
+            rows.code,
+            delayed,
+            NO_LEARNING if learning is None else learning.arrays,
+            _following(learning, follows, n),
+        )
+        if done < n:
+            gap, x, z = arrays.reading[:4], float(arrays.reading[4]), float(arrays.reading[5])
+            told = regulator.describe(int(code[done]), gap, x, z)
+            raise MeasurementFault(f'sample {done}: {told}')
+    else:
+        _asking_loop(regulator, arrays, references, rows, delayed)
     radius = stage.parameters.machine.radius
     if not arrays.effects.sensor.on:
         own[:, :4] = motor_gaps(state[:, ::2], radius)

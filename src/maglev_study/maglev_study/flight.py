@@ -15,6 +15,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from maglev_controller.foreign_law import Law
 from maglev_controller.learning import IterativeLearning, iterative_learning
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
@@ -88,19 +89,22 @@ def fly(
     *,
     duration: float | None = None,
     files: Sequence[str | Path] = (),
-    plant: Mapping[str, object] | None = None,
-    controller: Mapping[str, object] | None = None,
+    plant: PlantParameters | Mapping[str, object] | None = None,
+    controller: ControllerParameters | Mapping[str, object] | None = None,
     reference: Mapping[str, object] | None = None,
+    law: Law | None = None,
 ) -> FlightRecord:
     """Lift off, follow a trajectory, land: simulated stage, regulator and reference in lockstep.
 
     ``trajectory`` is ``ellipse``, ``ellipse_4dof`` or one of the reference's own; ``duration`` [s]
     the time that is measured. All parameters have the nodes' defaults, the benchmark plant among
     them. ``files`` are parameter files as the nodes take them, the later winning; what is given
-    here by name wins over them, ``plant={'encoder.gap_noise': 1e-6}``.
+    here by name wins over them, ``plant={'encoder.gap_noise': 1e-6}``; a whole table is taken as it
+    is, and ``files`` do not change it. ``law``, an object as in docs/extending.md, answers in place
+    of the controller's own.
 
     Raises ParameterError naming what is wrong with a parameter or out of the reference's reach, and
-    MeasurementFault when the regulator gives the platen up.
+    MeasurementFault when the regulator gives the platen up, LawFault when a law of your own fails.
     """
     followed: dict[str, object] = {}
     if trajectory is not None:
@@ -122,7 +126,7 @@ def fly(
     references = References(block.position, block.velocity, block.acceleration)
     learning = iterative_learning(control_table)
     outcome = run(
-        Regulator(control_table),
+        Regulator(control_table, law),
         SimulatedStage(stage_table),
         references,
         learning=learning,
@@ -133,6 +137,13 @@ def fly(
 
 
 def _table(
-    cls: type[T], node: str, files: Sequence[str | Path], given: Mapping[str, object] | None
+    cls: type[T], node: str, files: Sequence[str | Path], given: T | Mapping[str, object] | None
 ) -> T:
+    if isinstance(given, cls):
+        return given
+    if given is not None and not isinstance(given, Mapping):
+        raise TypeError(
+            f"'{node}' is a {type(given).__name__}, it takes {cls.__name__}, or a dict of its "
+            'parameters by name'
+        )
     return replace(from_yaml(cls, node, *files), given or {})

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from bokeh.resources import Resources
 from made_up_run import TOPICS, open_bag, write_samples
-from matplotlib.figure import Figure
 
-from maglev_model.parameters import ParameterError, build
+from maglev_model.parameters import DIFFERS, ParameterError, build
 from maglev_monitor.bag.analysis import analyse
 from maglev_monitor.metrics.decoding import decode
 from maglev_monitor.metrics.joiner import Joiner
@@ -27,7 +27,7 @@ from maglev_monitor.report.terminal import as_text
 @pytest.fixture
 def no_plots(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures take seconds; one test draws them all."""
-    monkeypatch.setattr(run_report, 'plots', lambda _: [])
+    monkeypatch.setattr(run_report, 'charts', lambda _: [])
 
 
 def test_live_and_bag_agree_exactly(bag: Path, run: Any, messages: dict[str, list[bytes]]) -> None:
@@ -47,12 +47,15 @@ def test_report_is_self_contained(bag: Path, tmp_path: Path, capsys: Any) -> Non
     assert analyze([str(bag), '--out', str(tmp_path)]) == PASS
     page = (tmp_path / 'report.html').read_text(encoding='utf-8')
     assert len(page) < 3_000_000
-    assert not re.findall(r'(?:src|href)="(?!data:)', page)
-    assert 'http' not in re.sub(r'base64,[^"]*', '', page)
+    library = Resources(mode='inline', components=['bokeh']).render_js()
+    assert library in page
+    assert 'http' not in page.replace(library, '')
+    assert not re.findall(r'(?:src|href)=', page.replace(library, ''))
     titles = re.findall(r'<h2>([^<]*)</h2>', page)
-    for title in ('The whole run', 'Steps', 'Tracking in detail', 'The path', 'Currents', 'Timing'):
-        assert title in titles
-    assert page.count('data:image/png;base64,') == 6
+    charts = ['The whole run', 'Steps', 'Tracking in detail', 'Reversal peaks']
+    charts += ['The path', 'Currents', 'Timing']
+    assert [title for title in titles if title not in ('Tracking errors', 'Limits')][1:] == charts
+    assert page.count('data-root-id=') == 10 + 4 + 10 + 3 + 3 + 8 + 2
     assert 'made_up' in page
     printed = capsys.readouterr().out
     found = json.loads((tmp_path / 'metrics.json').read_text())
@@ -66,8 +69,13 @@ def test_report_goes_beside_the_bag_and_keeps_the_live_metrics(bag: Path, tmp_pa
     folder = tmp_path / 'run'
     shutil.copytree(bag, folder / 'bag')
     (folder / 'metrics.json').write_text('live')
+    (folder / 'params').mkdir()
+    lines = f'{DIFFERS}fan: 7 (by default 2)\n{DIFFERS}effective_parameters: no news\nplant:\n'
+    (folder / 'params' / 'plant.yaml').write_text(lines)
     assert analyze([str(folder / 'bag')]) == PASS
-    assert (folder / 'report.html').is_file()
+    page = (folder / 'report.html').read_text(encoding='utf-8')
+    assert '<tr><td>plant</td><td>fan: 7 (by default 2)</td></tr>' in page
+    assert 'no news' not in page
     assert (folder / 'metrics.json').read_text() == 'live'
 
 
@@ -77,10 +85,7 @@ def test_a_run_on_hardware_or_with_topics_lost_is_reported(
     tmp_path: Path,
     run: Any,
     messages: dict[str, list[bytes]],
-    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    drawn: list[Figure] = []
-    monkeypatch.setattr(Figure, 'savefig', lambda figure, *_, **__: drawn.append(figure))
     writer = open_bag(tmp_path / 'bag')
     for key in ('reference', *kept):
         stamps = run.stamp[:900].tolist()
@@ -91,7 +96,9 @@ def test_a_run_on_hardware_or_with_topics_lost_is_reported(
     assert found['error_source'] == 'measured'
     assert found['verdict'] == 'incomplete'
     assert ('currents' in kept) == (found['missing_by_topic']['currents'] == 0)
-    assert len(drawn) == {2: 6, 1: 5}[len(kept)]
+    page = (tmp_path / 'report.html').read_text(encoding='utf-8')
+    assert ('<h2>Currents</h2>' in page) == ('currents' in kept)
+    assert '<h2>Tracking in detail</h2>' in page
 
 
 @pytest.mark.usefixtures('no_plots')
@@ -174,3 +181,26 @@ def test_metrics_are_written_whole_or_not_at_all(
     with pytest.raises(TypeError):
         write_metrics(path, {'verdict': object()})
     assert json.loads(path.read_text()) == {'verdict': 'pass'}
+
+
+def test_two_runs_lie_side_by_side(bag: Path, tmp_path: Path, capsys: Any) -> None:
+    other = tmp_path / 'other' / 'bag'
+    shutil.copytree(bag, other)
+    (other.parent / 'params').mkdir()
+    (other.parent / 'params' / 'plant.yaml').write_text(f'{DIFFERS}fan: 7 (by default 2)\n')
+    assert analyze([str(bag), str(other), '--out', str(tmp_path)]) == PASS
+    page = (tmp_path / 'two_runs.html').read_text(encoding='utf-8')
+    assert 'plant: fan: 7 (by default 2)' in page
+    assert page.count('<td>1.00</td>') == 3 * 5
+    assert page.count('overshoot') == 2 * 2
+    assert page.count('data-root-id=') == 5
+    assert capsys.readouterr().out.count('verdict: pass') == 2
+    assert not (tmp_path / 'metrics.json').exists()
+
+
+def test_a_second_run_that_cannot_be_read_is_one_line(
+    bag: Path, tmp_path: Path, capsys: Any
+) -> None:
+    assert analyze([str(bag), str(tmp_path / 'none'), '--out', str(tmp_path)]) == BAD_BAG
+    assert 'none' in capsys.readouterr().err
+    assert not list(tmp_path.glob('*.html'))

@@ -13,6 +13,10 @@ To add another:
    transfer function needs no more than its zeros and poles, see ``feedback_lead_lag.py``. Two
    constants are optional: ``HAS_CROSSOVER = True`` where ``compensator.crossover`` sets the
    bandwidth, and ``REFERENCES``, the paper's references by number that the law is taken from.
+
+   A law that is no such compensator has a function ``make(parameters)`` instead, which returns an
+   object that is asked once a sample, see :class:`~maglev_controller.foreign_law.Law`; ``check`` is
+   optional for it.
 2. In this folder it is chosen by its name, ``law: my_law``; anywhere else where Python finds it, by
    its dotted path, ``law: my_package.my_law``.
 3. To be compared with the others, it has a file ``params/laws/my_law.yaml``: ``law: my_law``, and
@@ -24,20 +28,27 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 
-from maglev_controller.checks import check_machine
+from maglev_controller.checks import check_foreign, check_machine
 from maglev_controller.design.axis_design import AxisDesign
+from maglev_controller.foreign_law import Law
 from maglev_controller.parameters import ControllerParameters
 from maglev_model.plugins import find_plugin, names_in
+
+_LANDS = 'output_regulator'
 
 
 @dataclasses.dataclass(frozen=True)
 class ControlLaw:
-    """What the module of a law offers."""
+    """What the module of a law offers.
+
+    Where it can ``make`` an object, ``design`` is that of the law which lands when this one fails.
+    """
 
     check: Callable[[ControllerParameters], None]
     design: Callable[[ControllerParameters, str], AxisDesign]
     has_crossover: bool
     references: tuple[int, ...]
+    make: Callable[[ControllerParameters], Law] | None = None
 
 
 def law_names() -> tuple[str, ...]:
@@ -50,13 +61,18 @@ def find_law(name: str) -> ControlLaw:
 
     Raises :class:`ParameterError` when there is none, or when its module cannot be used.
     """
-    module = find_plugin('law', name, ('check', 'design'), __name__)
-    return ControlLaw(
-        check=module.check,
-        design=module.design,
-        has_crossover=getattr(module, 'HAS_CROSSOVER', False),
-        references=getattr(module, 'REFERENCES', ()),
-    )
+    module = find_plugin('law', name, (), __name__)
+    references = getattr(module, 'REFERENCES', ())
+    if callable(getattr(module, 'make', None)):
+        check = getattr(module, 'check', _check_nothing)
+        return ControlLaw(check, find_law(_LANDS).design, False, references, module.make)
+    find_plugin('law', name, ('check', 'design'), __name__)
+    has_crossover = getattr(module, 'HAS_CROSSOVER', False)
+    return ControlLaw(module.check, module.design, has_crossover, references)
+
+
+def _check_nothing(_: ControllerParameters) -> None:
+    pass
 
 
 def control_law(parameters: ControllerParameters) -> ControlLaw:
@@ -67,4 +83,6 @@ def control_law(parameters: ControllerParameters) -> ControlLaw:
     law = find_law(parameters.law)
     check_machine(parameters)
     law.check(parameters)
+    if law.make is not None:
+        check_foreign(parameters)
     return law

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from maglev_model.parameters import ParameterError
+from maglev_model.parameters import DIFFERS, ParameterError
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.reader import Bag
 from maglev_monitor.metrics.curves import RunCurves
@@ -32,6 +32,8 @@ class Analysis:
     run: RunParameters
     tick_histogram: NDArray[np.int64]
     notes: list[str]
+    changes: list[tuple[str, str]]
+    """Node, and a parameter of it that was not as by default, with both values."""
 
 
 def analyse(path: Path) -> Analysis:
@@ -40,7 +42,7 @@ def analyse(path: Path) -> Analysis:
     Raises :class:`~.errors.BagError` when there is no bag, or nothing of a run in it.
     """
     bag = Bag(path)
-    run = _run_parameters(bag)
+    run = run_parameters(bag)
     metrics, curves, joiner = RunMetrics(run), RunCurves(run), Joiner()
     for batch in bag.batches():
         for key, records in batch.samples.items():
@@ -54,10 +56,21 @@ def analyse(path: Path) -> Analysis:
         curves.add(metrics.add(block))
     if not metrics.started:
         raise BagError(f"the bag '{bag.path}' holds no run: the reference never left REST")
-    return Analysis(metrics.result(), curves, run, metrics.tick_histogram, list(bag.notes))
+    result, changes = metrics.result(), _changes(bag.path.resolve().parent / 'params')
+    return Analysis(result, curves, run, metrics.tick_histogram, list(bag.notes), changes)
 
 
-def _run_parameters(bag: Bag) -> RunParameters:
+def _changes(folder: Path) -> list[tuple[str, str]]:
+    """What the nodes of a run wrote of their parameters, nothing where they wrote none."""
+    changes = []
+    for file in sorted(folder.glob('*.yaml')):
+        for line in file.read_text(encoding='utf-8', errors='replace').splitlines():
+            if line.startswith(DIFFERS) and not line.startswith(f'{DIFFERS}effective_parameters'):
+                changes.append((file.stem, line.removeprefix(DIFFERS)))
+    return changes
+
+
+def run_parameters(bag: Bag) -> RunParameters:
     """The parameters the monitor left in the bag; the defaults when there was no monitor."""
     for batch in bag.batches():
         for status in batch.diagnostics:

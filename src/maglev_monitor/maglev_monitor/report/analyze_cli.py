@@ -1,4 +1,7 @@
-"""``analyze BAG``: the figures of a run from its bag alone, and its report. No ROS here."""
+"""``analyze BAG``: the figures of a run from its bag alone, and its report. No ROS here.
+
+``analyze BAG OTHER`` lays two runs side by side.
+"""
 
 from __future__ import annotations
 
@@ -20,28 +23,32 @@ PASS, NOT_PASSED, BAD_BAG = 0, 1, 2
 def analyze(arguments: Sequence[str] | None = None) -> int:
     """Run the command and return its exit code.
 
-    0: the bag is whole and its run passed; 1: it did not pass or has not reached its end; 2: the
+    0: every bag is whole and its run passed; 1: one did not pass or has not reached its end; 2: a
     bag cannot be read, or is cut off (its report is written all the same).
     """
     options = _parser().parse_args(arguments)
+    bags: list[Path] = [options.bag, *([options.other] if options.other else [])]
     try:
-        analysis = analyse(options.bag)
+        analyses = [analyse(bag) for bag in bags]
     except BagError as error:
         print(f'analyze: error: {error}', file=sys.stderr)
         return BAD_BAG
-    for note in analysis.notes:
+    notes = [note for analysis in analyses for note in analysis.notes]
+    for note in notes:
         print(f'analyze: {note}', file=sys.stderr)
-    folder = options.out or _beside(options.bag)
+    folder = options.out or (Path() if options.other else _beside(options.bag))
     try:
-        _write(folder, analysis)
+        page = _write(folder, bags, analyses)
     except OSError as error:
         print(f"analyze: error: cannot write to '{folder}': {error.strerror}", file=sys.stderr)
         return BAD_BAG
-    print(as_text(analysis.result))
-    print(f'report: {folder / "report.html"}')
-    if analysis.notes:
+    for analysis in analyses:
+        print(as_text(analysis.result))
+    print(f'report: {page}')
+    if notes:
         return BAD_BAG
-    return PASS if analysis.result['verdict'] == 'pass' else NOT_PASSED
+    passed = all(analysis.result['verdict'] == 'pass' for analysis in analyses)
+    return PASS if passed else NOT_PASSED
 
 
 def main() -> NoReturn:
@@ -57,7 +64,14 @@ def _parser() -> argparse.ArgumentParser:
         'bag', type=Path, metavar='BAG', help="a run's folder, a bag, or a bag's file"
     )
     parser.add_argument(
-        '--out', type=Path, metavar='DIR', help='where report.html goes (default: beside the bag)'
+        'other', type=Path, metavar='OTHER', nargs='?', help='another, to lay beside it'
+    )
+    parser.add_argument(
+        '--out',
+        type=Path,
+        metavar='DIR',
+        help='where the page goes: report.html (default: beside the bag), of two runs'
+        ' two_runs.html (default: here)',
     )
     return parser
 
@@ -70,9 +84,18 @@ def _beside(bag: Path) -> Path:
     return bag if (bag / 'bag').is_dir() else bag.parent
 
 
-def _write(folder: Path, analysis: Analysis) -> None:
-    from maglev_monitor.report.run_report import write_report  # matplotlib takes a second to load
+def _write(folder: Path, bags: Sequence[Path], analyses: Sequence[Analysis]) -> Path:
+    """Write the page, and the figures of a single run; returns where the page is."""
+    if len(analyses) > 1:
+        from maglev_monitor.report.two_runs import write_two_runs
 
-    write_report(folder / 'report.html', analysis)
+        page = folder / 'two_runs.html'
+        write_two_runs(page, [str(bag) for bag in bags], analyses)
+        return page
+    from maglev_monitor.report.run_report import write_report  # its figures are slow to load
+
+    page = folder / 'report.html'
+    write_report(page, analyses[0])
     if not (folder / 'metrics.json').exists():
-        write_metrics(folder / 'metrics.json', analysis.result)
+        write_metrics(folder / 'metrics.json', analyses[0].result)
+    return page

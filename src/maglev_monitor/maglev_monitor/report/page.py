@@ -7,14 +7,26 @@ import html
 import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from maglev_monitor.report.drawing import Plot
+if TYPE_CHECKING:
+    from maglev_monitor.report.drawing import Plot
 
 _CSS = """
-:root { --ink: #1d2733; --soft: #66727f; --line: #dfe4ea; --blue: #1f5fa8; }
+:root { color-scheme: light dark; --ink: #1d2733; --soft: #66727f; --line: #dfe4ea; --blue: #1f5fa8;
+  --paper: #ffffff; }
+@media (prefers-color-scheme: dark) {
+  :root { --ink: #dde3ea; --soft: #98a4b0; --line: #323c47; --blue: #5b9bdc; --paper: #12171d; }
+  img { background: #ffffff; border-radius: .4rem; }
+}
+@media print {
+  :root { --ink: #000000; --soft: #444444; --line: #cccccc; --paper: #ffffff; }
+  body { max-width: none; padding: 0; }
+  h2, img, .panels > div { break-inside: avoid; }
+}
 * { box-sizing: border-box; }
 body { font: 15px/1.55 system-ui, -apple-system, 'Segoe UI', Roboto, sans-serif; color: var(--ink);
-  margin: 0 auto; max-width: 1120px; padding: 2.2rem 1.4rem 4rem; background: #fff; }
+  margin: 0 auto; max-width: 1240px; padding: 2.2rem 1.4rem 4rem; background: var(--paper); }
 header { border-bottom: 3px solid var(--blue); padding-bottom: 1rem; margin-bottom: 1.4rem; }
 h1 { font-size: 1.7rem; margin: 0 0 .2rem; }
 h2 { font-size: 1.15rem; margin: 2.2rem 0 .4rem; }
@@ -24,13 +36,22 @@ h2 { font-size: 1.15rem; margin: 2.2rem 0 .4rem; }
   font-size: .95rem; vertical-align: .25rem; margin-left: .6rem; }
 .pass { background: #2a8a62; } .fail { background: #b3321d; } .incomplete { background: #b07a10; }
 .cards { display: flex; flex-wrap: wrap; gap: .8rem; margin: 1rem 0; }
-.card { border: 1px solid var(--line); border-radius: .5rem; padding: .5rem .9rem; min-width:
-8.5rem; } .card b { display: block; font-size: 1.15rem; } .card span { color: var(--soft);
-font-size: .85rem; } table { border-collapse: collapse; margin: .3rem 0 1rem; font-variant-numeric:
-tabular-nums; } th, td { padding: .28rem .9rem; border-bottom: 1px solid var(--line); text-align:
-right; } th { color: var(--soft); font-weight: 600; } th:first-child, td:first-child { text-align:
-left; } ul { margin: .3rem 0; padding-left: 1.2rem; } img { max-width: 100%; height: auto; display:
-block; } @media print { body { max-width: none; padding: 0; } h2, img { break-inside: avoid; } }
+.card { border: 1px solid var(--line); border-radius: .5rem; padding: .5rem .9rem;
+  min-width: 8.5rem; }
+.card b { display: block; font-size: 1.15rem; }
+.card span { color: var(--soft); font-size: .85rem; }
+.panels { display: grid; gap: .4rem 1.2rem; grid-template-columns: minmax(0, 1fr); }
+@media (min-width: 720px), print {
+  .columns2 { grid-template-columns: repeat(2, minmax(0, 1fr)); }
+  .columns3 { grid-template-columns: repeat(3, minmax(0, 1fr)); }
+}
+.wide { overflow-x: auto; }
+table { border-collapse: collapse; margin: .3rem 0 1rem; font-variant-numeric: tabular-nums; }
+th, td { padding: .28rem .9rem; border-bottom: 1px solid var(--line); text-align: right; }
+th { color: var(--soft); font-weight: 600; }
+th:first-child, td:first-child { text-align: left; }
+ul { margin: .3rem 0; padding-left: 1.2rem; }
+img { max-width: 100%; height: auto; display: block; }
 """
 
 
@@ -76,7 +97,7 @@ def html_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     body = ''.join(
         '<tr>' + ''.join(f'<td>{html.escape(cell)}</td>' for cell in row) + '</tr>' for row in rows
     )
-    return f'<table><tr>{head}</tr>{body}</table>'
+    return f'<div class="wide"><table><tr>{head}</tr>{body}</table></div>'
 
 
 def bullets(title: str, lines: Sequence[str]) -> str:

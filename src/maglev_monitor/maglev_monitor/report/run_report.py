@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +16,9 @@ from maglev_monitor.metrics.readable import (
     saturation,
     seconds,
 )
-from maglev_monitor.report.page import bullets, header, html_table, page, picture, write_page
-from maglev_monitor.report.run_plots import plots
+from maglev_monitor.report.chart import render as render_charts
+from maglev_monitor.report.page import bullets, header, html_table, page, write_page
+from maglev_monitor.report.run_charts import charts
 
 
 def write_report(path: Path, analysis: Analysis) -> None:
@@ -26,7 +27,7 @@ def write_report(path: Path, analysis: Analysis) -> None:
 
 
 def render(analysis: Analysis) -> str:
-    """The whole report as HTML; figures are embedded, nothing is fetched."""
+    """The whole report as HTML; nothing is fetched."""
     result = analysis.result
     name = result['scenario'] or 'run'
     parts = [
@@ -38,7 +39,8 @@ def render(analysis: Analysis) -> str:
         _tracking_table(result),
         _step_table(result),
         _limits_table(result['limits']),
-        *(picture(plot) for plot in plots(analysis)),
+        _changes_table(analysis.changes),
+        *render_charts(list(charts(analysis))),
     ]
     return page(name, parts)
 
@@ -111,3 +113,9 @@ def _limits_table(limits: Mapping[str, Any]) -> str:
             shown = number(value)
         rows.append([name.replace('_', ' '), shown])
     return '<h2>Limits</h2>' + html_table(['limit', 'value'], rows) if rows else ''
+
+
+def _changes_table(changes: Sequence[tuple[str, str]]) -> str:
+    if not changes:
+        return ''
+    return '<h2>Parameters that are not as by default</h2>' + html_table(['node', ''], changes)

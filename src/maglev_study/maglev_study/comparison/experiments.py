@@ -91,7 +91,8 @@ class Row:
 
 def loops(contestant: Contestant) -> list[Row]:
     """Crossover and phase margin of every loop, as designed."""
-    margins = Flight(contestant).regulator.margins
+    regulator = Flight(contestant).regulator
+    margins = regulator.margins
     shown = [margins[axis] for axis in (Y, X, THETA) if axis != THETA or contestant.tilts]
     section = 'the loops as designed, y/x/theta'
     rows = []
@@ -99,7 +100,9 @@ def loops(contestant: Contestant) -> list[Row]:
         ('crossover [rad/s]', tuple(found.crossover for found in shown)),
         ('phase margin [deg]', tuple(found.phase for found in shown)),
     ):
-        rows.append(Row(section, title, '/'.join(f'{value:.0f}' for value in values), values))
+        text = '/'.join(f'{value:.0f}' for value in values)
+        known = regulator.foreign is None  # the margins are those of what lands in its place
+        rows.append(Row(section, title, text, values) if known else Row(section, title, NONE, ()))
     return rows
 
 

@@ -13,7 +13,7 @@ from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import MeasurementFault, Regulator
 from maglev_model.axes import PHI, FloatArray, Y
 from maglev_plant.simulation import SimulatedStage
-from maglev_study.closed_loop import Run, run
+from maglev_study.closed_loop import LawFault, Run, run
 from maglev_study.comparison.contestants import Contestant
 from maglev_study.references import HOVER, References, held, shaped
 
@@ -59,10 +59,10 @@ class Flight:
         self.seat_radius = parameters.stop.seat_radius
 
     def follow(self, references: References) -> Run | None:
-        """Carry on along a reference; None when the platen meets a stop or is given up."""
+        """Carry on along a reference; None when the platen meets a stop, or is given up."""
         try:
             outcome = run(self.regulator, self.stage, references)
-        except MeasurementFault:
+        except (MeasurementFault, LawFault):
             return None
         return None if self._met_stop(outcome.output) else outcome
 

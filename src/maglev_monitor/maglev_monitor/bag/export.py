@@ -1,0 +1,121 @@
+"""A run written as csv, parquet, mat or npz. No ROS here."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from maglev_model.optional import needed
+from maglev_monitor.bag.columns import Table, table
+
+_ROWS = 10_000  # of text that is made at once
+
+
+def read(path: str | Path) -> Any:
+    """The run in a bag as a ``pandas.DataFrame``, its index the stage time [s].
+
+    One row a sample; ``attrs`` holds ``units`` and ``descriptions`` by column, and ``notes`` on the
+    bag. Raises :class:`~.errors.BagError` for what is no bag of a run, and
+    :class:`~maglev_model.optional.MissingLibraryError` without pandas.
+    """
+    with needed('pandas', 'read'):
+        import pandas
+    found = table(path)
+    frame = pandas.DataFrame(found.columns).set_index('time')
+    frame.attrs = {
+        'units': dict(found.units),
+        'descriptions': dict(found.descriptions),
+        'notes': list(found.notes),
+    }
+    return frame
+
+
+def write(found: Table, path: Path, form: str) -> list[Path]:
+    """Write a run in one of :data:`FORMATS`; returns the files. They take their place when whole.
+
+    Raises OSError where it cannot be written, and :class:`MissingLibraryError`.
+    """
+    partial = path.with_name(path.name + '.tmp')
+    try:
+        FORMATS[form](found, partial)
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
+    if form != 'csv':
+        return [path]
+    described = path.with_name(f'{path.stem}_columns.csv')
+    described.write_text(_described(found), encoding='utf-8')
+    return [path, described]
+
+
+def _described(found: Table) -> str:
+    text = io.StringIO()
+    rows = csv.writer(text, lineterminator='\n')
+    rows.writerow(('column', 'unit', 'description'))
+    rows.writerows((name, found.units[name], found.descriptions[name]) for name in found.columns)
+    return text.getvalue()
+
+
+def _csv(found: Table, path: Path) -> None:
+    """Numbers that read back exactly, nothing where there is none."""
+    with path.open('w', encoding='utf-8') as file:
+        file.write(','.join(found.columns) + '\n')
+        for first in range(0, len(found.columns['sample']), _ROWS):
+            texts = [_texts(column[first : first + _ROWS]) for column in found.columns.values()]
+            file.writelines(','.join(row) + '\n' for row in zip(*texts, strict=True))
+
+
+def _texts(values: Any) -> list[str]:
+    if values.dtype.kind == 'f':
+        return ['' if value != value else repr(value) for value in values.tolist()]
+    return [str(value) for value in values.tolist()]
+
+
+def _npz(found: Table, path: Path) -> None:
+    """The columns, and ``names``, ``units`` and ``descriptions`` in their order."""
+    content: dict[str, Any] = {**found.columns, 'names': list(found.columns)}
+    content['units'] = list(found.units.values())
+    content['descriptions'] = list(found.descriptions.values())
+    with path.open('wb') as file:
+        np.savez_compressed(file, **content)
+
+
+def _mat(found: Table, path: Path) -> None:
+    """The columns as column vectors, and the structs ``units`` and ``descriptions``."""
+    from scipy.io import savemat
+
+    content = {**found.columns, 'units': found.units, 'descriptions': found.descriptions}
+    with path.open('wb') as file:
+        savemat(file, content, do_compression=True, oned_as='column')
+
+
+def _parquet(found: Table, path: Path) -> None:
+    """The columns, each with its unit and description in its field's metadata."""
+    with needed('pyarrow', 'the format parquet'):
+        import pyarrow
+        import pyarrow.parquet
+    fields = [
+        pyarrow.field(
+            name,
+            pyarrow.from_numpy_dtype(column.dtype),
+            metadata={'unit': found.units[name], 'description': found.descriptions[name]},
+        )
+        for name, column in found.columns.items()
+    ]
+    columns = list(found.columns.values())
+    whole = pyarrow.table(columns, schema=pyarrow.schema(fields))
+    pyarrow.parquet.write_table(whole, path)
+
+
+FORMATS: dict[str, Callable[[Table, Path], None]] = {
+    'csv': _csv,
+    'parquet': _parquet,
+    'mat': _mat,
+    'npz': _npz,
+}
+"""What writes each format."""

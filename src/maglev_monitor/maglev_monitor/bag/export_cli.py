@@ -1,0 +1,73 @@
+"""``export BAG``: a run for other programs, as csv, parquet, mat or npz. No ROS here."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from maglev_model.command import leave_with
+from maglev_model.optional import MissingLibraryError
+from maglev_monitor.bag.columns import table
+from maglev_monitor.bag.errors import BagError
+from maglev_monitor.bag.export import FORMATS, write
+
+DONE, FAILED = 0, 2
+
+
+def export(arguments: Sequence[str] | None = None) -> int:
+    """Run the command and return its exit code.
+
+    0: the run is written; 2: the bag cannot be read, or the file not be written.
+    """
+    options = _parser().parse_args(arguments)
+    out = options.out or _beside(options.bag).with_suffix(f'.{options.format}')
+    try:
+        found = table(options.bag)
+        files = write(found, out, options.format)
+    except (BagError, MissingLibraryError) as error:
+        return _failed(str(error))
+    except OSError as error:
+        return _failed(f"cannot write '{out}': {error.strerror}")
+    for note in found.notes:
+        print(f'export: {note}', file=sys.stderr)
+    print(f'{len(found.columns["sample"])} samples, {len(found.columns)} columns')
+    for file in files:
+        print(f'  {file}')
+    return DONE
+
+
+def main() -> NoReturn:
+    """Entry point of the executable."""
+    leave_with(export)
+
+
+def _failed(reason: str) -> int:
+    print(f'export: error: {reason}', file=sys.stderr)
+    return FAILED
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog='export', description='Write a recorded run for other programs, one row a sample.'
+    )
+    parser.add_argument(
+        'bag', type=Path, metavar='BAG', help="a run's folder, a bag, or a bag's file"
+    )
+    parser.add_argument(
+        '--format', choices=tuple(FORMATS), default='csv', help='(default: %(default)s)'
+    )
+    parser.add_argument(
+        '--out', type=Path, metavar='FILE', help='(default: samples.FORMAT beside the bag)'
+    )
+    return parser
+
+
+def _beside(bag: Path) -> Path:
+    """``samples`` in the folder of the run: that of the bag's folder, or of its file."""
+    bag = bag.resolve()
+    if bag.is_file():
+        bag = bag.parent
+    return (bag if (bag / 'bag').is_dir() else bag.parent) / 'samples'

@@ -1,0 +1,200 @@
+"""Interactive figures for self-contained pages: zoom, hover, linked axes. No ROS here."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from bokeh.embed import components
+from bokeh.models import (
+    BoxAnnotation,
+    ColumnDataSource,
+    CrosshairTool,
+    DataRange1d,
+    HoverTool,
+    Span,
+)
+from bokeh.plotting import figure
+from bokeh.resources import Resources
+from numpy.typing import NDArray
+
+from maglev_model.phases import Phase
+from maglev_monitor.metrics.curves import COLUMNS
+from maglev_monitor.metrics.envelope import Envelope
+
+FloatArray = NDArray[np.float64]
+
+REFERENCE, POSITION, ERROR, SECOND = '#8b949e', '#1f77c9', '#d55e00', '#009e73'
+COLOURS = (POSITION, ERROR, SECOND, '#cc79a7', '#e69f00', '#56b4e9', REFERENCE)
+"""Told apart by colour-blind readers (Okabe and Ito, 2008), on white and on black."""
+
+TITLES = {
+    'y': 'air gap y',
+    'x': 'displacement x',
+    'z': 'displacement z',
+    'phi': 'tilt φ',
+    'theta': 'tilt θ',
+}
+FLOOR = 0.1  # of logarithmic error scales [µm, µrad]
+MOVES = 1e-7  # a reference that moves less stands still [m, rad]
+_INK, _GRID, _SHADE = '#7d8790', '#8b949e', '#56b4e9'
+_HEIGHT = 230  # of a panel [px]
+
+
+class Chart(NamedTuple):
+    """A heading, what is shown below it, and its panels, which stand in ``columns``."""
+
+    title: str
+    caption: str
+    panels: Sequence[figure]
+    columns: int = 2
+
+
+class Column(NamedTuple):
+    """A curve of an envelope: the place of its column, and what to multiply it by."""
+
+    place: int
+    scale: float
+
+
+def column(name: str, index: int, scale: float = 1.0) -> Column:
+    """The ``index``-th of the columns called ``name``."""
+    return Column(COLUMNS[name].start + index, scale)
+
+
+def units(axis: str) -> tuple[str, str]:
+    """Units of an axis in thousandths and millionths."""
+    return ('mrad', 'µrad') if axis in ('phi', 'theta') else ('mm', 'µm')
+
+
+class Panels:
+    """Makes panels over one horizontal axis: zoomed in one, all are."""
+
+    def __init__(self, horizontal: str, **options: Any) -> None:
+        self._horizontal, self._options = horizontal, options
+        self._range: Any = DataRange1d(range_padding=0.02)
+        self._hair = Span(dimension='height', line_color=_INK, line_width=0.7, line_dash='dotted')
+
+    def panel(self, title: str, vertical: str, **options: Any) -> figure:
+        """An empty panel."""
+        made = figure(
+            title=title,
+            x_axis_label=self._horizontal,
+            y_axis_label=vertical,
+            x_range=self._range,
+            sizing_mode='stretch_width',
+            tools='xbox_zoom,box_zoom,xpan,xwheel_zoom,reset,save',
+            active_drag='xbox_zoom',
+            active_scroll=None,
+            **{'height': _HEIGHT, **self._options, **options},
+        )
+        made.add_tools(CrosshairTool(overlay=self._hair))
+        _dress(made)
+        return made
+
+
+def _dress(made: figure) -> None:
+    """Colours that can be read on white and on black."""
+    made.toolbar.logo = None
+    made.toolbar.autohide = True
+    made.background_fill_color = made.border_fill_color = None
+    made.outline_line_color = None
+    made.title.text_color = _INK
+    for axis in made.axis:
+        axis.axis_label_text_color = axis.major_label_text_color = _INK
+        axis.axis_line_color = axis.major_tick_line_color = _INK
+        axis.minor_tick_line_color = None
+        axis.axis_label_text_font_style = 'normal'
+    made.grid.grid_line_color = _GRID
+    made.grid.grid_line_alpha = 0.25
+
+
+def line(
+    panel: figure, x: FloatArray, y: FloatArray, name: str, colour: str, **options: Any
+) -> None:
+    """One curve, which says its values where the pointer is."""
+    source = ColumnDataSource({'x': x.astype(np.float32), 'y': y.astype(np.float32)})
+    options = {'line_width': 1.1, **options}
+    drawn = panel.line('x', 'y', source=source, color=colour, legend_label=name, **options)
+    tips = [(name, '@y{0.[0000]}'), (panel.xaxis[0].axis_label, '@x{0.[000]}')]
+    panel.add_tools(HoverTool(renderers=[drawn], tooltips=tips, mode='vline', visible=False))
+
+
+def envelope(
+    panel: figure, time: FloatArray, curve: Envelope, of: Column, name: str, colour: str
+) -> None:
+    """One curve through least and greatest values in turn, so that every peak is drawn."""
+    both = np.stack([curve.low[:, of.place], curve.high[:, of.place]], axis=1)
+    if curve.width == 1:
+        line(panel, time, both[:, 0] * of.scale, name, colour)
+    else:
+        line(panel, np.repeat(time, 2), both.ravel() * of.scale, name, colour)
+
+
+def magnitude(curve: Envelope, of: Column) -> FloatArray:
+    """The largest absolute value of each bin, shape (n,)."""
+    both = np.stack([curve.low[:, of.place], curve.high[:, of.place]])
+    largest: FloatArray = np.abs(both * of.scale).max(axis=0)
+    return largest
+
+
+def level(panel: figure, value: float, colour: str = _INK, dash: str = 'dotted') -> None:
+    """A horizontal line across the panel."""
+    panel.add_layout(Span(location=value, line_color=colour, line_dash=dash, line_width=1))
+
+
+def mark(panel: figure, value: float, colour: str) -> None:
+    """A vertical line across the panel."""
+    panel.add_layout(
+        Span(location=value, dimension='height', line_color=colour, line_dash='dashed')
+    )
+
+
+def band(panel: figure, low: float, high: float) -> None:
+    """Shade what lies between two values."""
+    panel.add_layout(BoxAnnotation(bottom=low, top=high, fill_color=_SHADE, fill_alpha=0.12))
+
+
+def shade(panel: figure, whole: Envelope, time: FloatArray) -> None:
+    """Shade the tracking window."""
+    tracked = np.flatnonzero(whole.first[:, COLUMNS['phase']][:, 0] == Phase.TRACK)
+    if len(tracked):
+        first, last = float(time[tracked[0]]), float(time[tracked[-1]])
+        panel.add_layout(BoxAnnotation(left=first, right=last, fill_color=_SHADE, fill_alpha=0.08))
+
+
+def legend(panel: figure, place: str = 'top_right') -> None:
+    """Show the names of the curves; a click on one hides its curve."""
+    panel.legend.location = place
+    panel.legend.click_policy = 'hide'
+    panel.legend.orientation = 'horizontal'
+    panel.legend.label_text_font_size = '8pt'
+    panel.legend.label_text_color = _INK
+    panel.legend.background_fill_alpha = 0.0
+    panel.legend.border_line_color = None
+    panel.legend.padding = panel.legend.margin = 2
+
+
+def no_legend(panel: figure) -> None:
+    """Leave the names of the curves to the panel's title."""
+    panel.legend.visible = False
+
+
+def render(charts: Sequence[Chart]) -> list[str]:
+    """The charts as parts of a page, their scripts included; nothing when there are none."""
+    if not charts:
+        return []
+    panels = [panel for chart in charts for panel in chart.panels]
+    script, divisions = components(panels)
+    rest = iter(divisions)
+    parts = [Resources(mode='inline', components=['bokeh']).render_js()]
+    for chart in charts:
+        inner = ''.join(f'<div>{next(rest)}</div>' for _ in chart.panels)
+        parts.append(
+            f'<h2>{html.escape(chart.title)}</h2>\n'
+            f'<p class="caption">{html.escape(chart.caption)}</p>\n'
+            f'<div class="panels columns{chart.columns}">{inner}</div>'
+        )
+    return [*parts, script]

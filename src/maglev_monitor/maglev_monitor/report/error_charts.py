@@ -1,0 +1,77 @@
+"""What the errors of a tracked path are made of: their spectrum, and their peaks. No ROS here."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import signal
+
+from maglev_model.axes import AXES
+from maglev_monitor.bag.analysis import Analysis
+from maglev_monitor.report.chart import (
+    COLOURS,
+    ERROR,
+    MOVES,
+    Chart,
+    Panels,
+    column,
+    legend,
+    line,
+    no_legend,
+    units,
+)
+
+_WINDOW = 1024  # samples in a segment of the spectrum
+_LEAST_TAIL = 512  # samples of tracking that give a spectrum
+
+
+def spectrum(analysis: Analysis) -> Chart | None:
+    """Amplitude spectral density of each error (Welch's method), or None when tracking is short."""
+    sequence, values = analysis.curves.tail
+    if len(sequence) < _LEAST_TAIL:
+        return None
+    source, rate = analysis.result['error_source'], 1.0 / analysis.run.metrics.sample_time
+    panels = Panels('frequency [Hz]', x_axis_type='log', y_axis_type='log', height=300)
+    drawn = []
+    for axes, unit in (((0, 1, 2), 'µm'), ((3, 4), 'µrad')):
+        panel = panels.panel('', f'[{unit}/√Hz]')
+        for colour, index in zip(COLOURS, axes, strict=False):
+            error = 1e6 * values[:, column(f'{source}_error', index).place]
+            error = error[np.isfinite(error)]
+            if len(error) < _LEAST_TAIL or np.ptp(error) == 0.0:
+                continue
+            frequency, power = signal.welch(error, rate, nperseg=min(_WINDOW, len(error)))
+            line(panel, frequency[1:], np.sqrt(power[1:]), AXES[index], colour)
+        if panel.renderers:
+            legend(panel)
+            drawn.append(panel)
+    if not drawn:
+        return None
+    caption = (
+        'Amplitude spectral density of the errors over the samples of the figure above: integrated '
+        "over the frequency, its square is the errors' variance."
+    )
+    return Chart('Spectrum of the errors', caption, drawn)
+
+
+def reversals(analysis: Analysis) -> Chart | None:
+    """Errors against the velocity asked for: friction shows as a jump where that changes sign."""
+    sequence, values = analysis.curves.tail
+    source, drawn = analysis.result['error_source'], []
+    for index, axis in enumerate(AXES):
+        wanted = values[:, column('reference', index).place]
+        if len(sequence) < 2 or np.ptp(wanted) < MOVES:
+            continue
+        milli, micro = units(axis)
+        velocity = np.gradient(wanted, analysis.run.metrics.sample_time)
+        panel = Panels(f'velocity of the reference [{milli}/s]').panel(axis, f'e [{micro}]')
+        error = 1e6 * values[:, column(f'{source}_error', index).place]
+        line(panel, 1e3 * velocity, error, 'e', ERROR, line_width=0.8)
+        no_legend(panel)
+        drawn.append(panel)
+    if not drawn:
+        return None
+    caption = (
+        'The errors of the figure above against the velocity asked for. What friction leaves '
+        'stands where the velocity passes zero; what rises with the velocity is a lag.'
+    )
+    return Chart('Reversal peaks', caption, drawn, columns=3)

@@ -1,0 +1,103 @@
+"""The plant under a function, and one flight for each value of a parameter."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from maglev_controller.regulator import MeasurementFault
+from maglev_model.axes import AXES
+from maglev_model.parameters import ParameterError
+from maglev_model.stage import EncoderSample
+from maglev_plant import simulation
+from maglev_plant.parameters import PlantParameters
+from maglev_study.arguments import a_table
+from maglev_study.closed_loop import LawFault
+from maglev_study.flight import FlightRecord, fly
+
+NODES = ('plant', 'controller', 'reference')
+
+
+def simulate(
+    law: Callable[[EncoderSample], tuple[ArrayLike, ArrayLike]],
+    duration: float,
+    *,
+    plant: PlantParameters | None = None,
+) -> simulation.Trajectory:
+    """The simulated stage under a function of yours, from sample 0 for ``duration`` [s].
+
+    ``law`` takes what the encoders read, ``gap`` (4,), ``x`` and ``z`` [m], and returns i_d and i_q
+    of motors 1..4 [A], (4,) each. Row k of what comes back is sample k. Raises TypeError for what
+    is no :class:`PlantParameters`, ValueError for a duration that is none and for currents that are
+    not finite or not four.
+    """
+    parameters = a_table(PlantParameters, plant, 'plant')
+    if not (math.isfinite(duration) and duration > 0.0):
+        raise ValueError(f"'duration' is {duration} s, it must be finite and above 0")
+    return simulation.simulate(parameters, law, duration)
+
+
+@dataclasses.dataclass(frozen=True)
+class Swept:
+    """One flight of a sweep: the parameter's ``value``, and how it went.
+
+    ``mean_error`` and ``largest_error`` by axis over the measured samples [m, rad]; ``saturated``
+    the share of all samples with a limited current. Where it did not fly, these are NaN and
+    ``reason`` says why; it is empty otherwise.
+    """
+
+    value: Any
+    mean_error: dict[str, float]
+    largest_error: dict[str, float]
+    saturated: float
+    reason: str = ''
+
+
+def sweep(
+    parameter: str,
+    values: Iterable[Any],
+    trajectory: str | None = None,
+    *,
+    duration: float | None = None,
+    **given: Any,
+) -> list[Swept]:
+    """Fly once for each of ``values`` of a parameter, which is named with its node.
+
+    ``sweep('controller.y.bandwidth', (100.0, 200.0), 'ellipse', duration=5.0)``; all else is given
+    as to :func:`~maglev_study.flight.fly`. A value that is refused, or with which the platen is
+    given up or the law fails, has its reason in the result. Raises ParameterError for a parameter
+    of no node.
+    """
+    node, dot, name = parameter.partition('.')
+    if node not in NODES or not dot:
+        raise ParameterError(
+            f"'{parameter}' names no node, it must begin with one of "
+            f'{", ".join(f"{node}." for node in NODES)} as in controller.y.bandwidth'
+        )
+    shared = given.pop(node, None) or {}
+    if not isinstance(shared, Mapping):
+        raise TypeError(f"'{node}' is swept over, so it takes a dict of parameters by name")
+    found = []
+    for value in values:
+        mine: Any = {**given, node: {**shared, name: value}}
+        try:
+            found.append(_swept(value, fly(trajectory, duration=duration, **mine)))
+        except (ParameterError, MeasurementFault, LawFault) as error:
+            nothing = dict.fromkeys(AXES, math.nan)
+            found.append(Swept(value, nothing, dict(nothing), math.nan, str(error)))
+    return found
+
+
+def _swept(value: Any, flight: FlightRecord) -> Swept:
+    largest = np.abs(flight.error[flight.measured]).max(axis=0)
+    return Swept(
+        value,
+        flight.mean_error,
+        {axis: float(most) for axis, most in zip(AXES, largest, strict=True)},
+        float(flight.run.saturated.mean()),
+    )

@@ -1,0 +1,1 @@
+"""The stage on standard topics and in the browser. Watches only: no flight depends on it."""

@@ -1,0 +1,126 @@
+"""The services behind the page's buttons, of the nodes that are stage, controller, reference."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from std_srvs.srv import SetBool, Trigger
+
+from maglev_node.node import MaglevNode
+from maglev_node.topics import CURRENTS, MEASUREMENT, REFERENCE
+
+
+class Call(NamedTuple):
+    """A service of the node that publishes a topic, and how long its answer is waited for [s]."""
+
+    topic: str
+    service: str
+    patience: float = 10.0
+
+    @property
+    def kind(self) -> Any:
+        """The type of the service."""
+        return SetBool if self.service == 'enable' else Trigger
+
+
+class Wish(NamedTuple):
+    """What to call in turn: all of it, or only until one call succeeds."""
+
+    calls: tuple[Call, ...]
+    one_is_enough: bool = False
+
+
+WISHES = {
+    'Lift off': Wish((Call(REFERENCE, 'lift_off'),)),
+    'Land': Wish((Call(REFERENCE, 'land'),)),
+    # The controller lands the platen; the stage, which may only cut the currents, comes second.
+    'Emergency stop': Wish(
+        (Call(CURRENTS, 'emergency_stop', 0.5), Call(MEASUREMENT, 'emergency_stop')),
+        one_is_enough=True,
+    ),
+    'Reset': Wish((Call(MEASUREMENT, 'reset'), Call(CURRENTS, 'reset'))),
+    'Enable': Wish((Call(CURRENTS, 'enable'),)),
+}
+"""By the buttons' labels."""
+
+
+class Operator:
+    """Calls services for whoever clicks; :meth:`look` and :meth:`go_on` are to be called often.
+
+    :param tell: takes what came of it, as a text.
+    """
+
+    def __init__(self, node: MaglevNode[Any], tell: Callable[[str], None]) -> None:
+        self._node, self._tell = node, tell
+        self._clients: dict[Call, Any] = {}
+        self._errands: list[_Errand] = []
+
+    def look(self) -> None:
+        """Find the nodes, so that their services know us before they are called."""
+        for call in {call for wish in WISHES.values() for call in wish.calls}:
+            publishers = self._node.get_publishers_info_by_topic(call.topic)
+            if not publishers:
+                continue
+            who = f'{publishers[0].node_namespace.rstrip("/")}/{publishers[0].node_name}'
+            name, client = f'{who}/{call.service}', self._clients.get(call)
+            if client is None or client.srv_name != name:
+                self._clients[call] = self._node.create_client(call.kind, name)
+
+    def ask(self, wish: str) -> None:
+        """Begin with what is wished."""
+        self._tell(f'{wish} …')
+        self._errands.append(_Errand(WISHES[wish], self._clients))
+
+    def go_on(self) -> None:
+        """Take the answers that have come and make the next calls."""
+        for errand in self._errands:
+            errand.go_on()
+            if errand.over:
+                self._tell('; '.join(errand.said))
+        self._errands = [errand for errand in self._errands if not errand.over]
+
+
+class _Errand:
+    """A wish on its way."""
+
+    def __init__(self, wish: Wish, clients: dict[Call, Any]) -> None:
+        self._wish, self._left, self._clients = wish, list(wish.calls), clients
+        self._future: Any = None
+        self._name, self._deadline = '', 0.0
+        self.said: list[str] = []
+        self.over = False
+        self._next()
+
+    def go_on(self) -> None:
+        if self._future is None:
+            return
+        if self._future.done():
+            answer = self._future.result()
+            words = answer.message or ('done' if answer.success else 'refused')
+            self._end(f'{self._name}: {words}', success=bool(answer.success))
+        elif time.monotonic() > self._deadline:
+            self._end(f'{self._name} does not answer', success=False)
+
+    def _next(self) -> None:
+        """Make the next call, if there is one left."""
+        if not self._left:
+            self.over, self._future = True, None
+            return
+        call = self._left.pop(0)
+        client = self._clients.get(call)
+        if client is None or not client.service_is_ready():
+            self._end(f'nobody offers {call.service} beside {call.topic}', success=False)
+            return
+        request = call.kind.Request()
+        if call.kind is SetBool:
+            request.data = True
+        self._name, self._deadline = client.srv_name, time.monotonic() + call.patience
+        self._future = client.call_async(request)
+
+    def _end(self, text: str, *, success: bool) -> None:
+        self.said.append(text)
+        if success and self._wish.one_is_enough:
+            self._left.clear()
+        self._next()

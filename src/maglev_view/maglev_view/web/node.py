@@ -1,0 +1,122 @@
+"""The web node: a live view of the stage in the browser, with buttons for its operator."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+from maglev_monitor.metrics.decoding import DecodeError, decode
+from maglev_node.node import MaglevNode, NodeError, NodeParameters
+from maglev_node.process import main as run_main
+from maglev_node.topics import (
+    CONTROLLER_STATE,
+    CURRENTS,
+    DIAGNOSTICS,
+    MEASUREMENT,
+    REFERENCE,
+    SAMPLE_TOPICS,
+    TRUE_STATE,
+)
+from maglev_view.parameters import WebParameters
+from maglev_view.web.calls import Operator
+from maglev_view.web.live import Live
+
+if TYPE_CHECKING:
+    from maglev_view.web.page import Page
+
+KEYS = {
+    MEASUREMENT: 'measurement',
+    CURRENTS: 'currents',
+    REFERENCE: 'reference',
+    CONTROLLER_STATE: 'controller',
+    TRUE_STATE: 'plant',
+}
+"""The topics that are shown, by the keys that their samples are decoded by."""
+
+_DEPTHS = {CONTROLLER_STATE: 16384}  # of which each sample counts; of the others the newest
+_MISSING = "the live view needs viser: run 'MAGLEV_SETUP=view source setup.sh', then again"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class WebNodeParameters(NodeParameters, WebParameters):
+    """The web node's parameters."""
+
+
+class WebNode(MaglevNode[WebNodeParameters]):
+    """Serves a page that shows the stage live, and calls services for who clicks on it.
+
+    A watcher that the loop does not know; it takes samples in bursts.
+    """
+
+    interface: ClassVar[Mapping[str, str]] = {
+        **dict.fromkeys(KEYS, 'subscribed: the newest sample'),
+        CONTROLLER_STATE: 'subscribed: each sample',
+        DIAGNOSTICS: 'subscribed: what nodes say of themselves',
+    }
+
+    def __init__(self) -> None:
+        super().__init__('web', WebNodeParameters)
+        self._page = self._serve()
+        self._live = Live(self.parameters)
+        self._operator = Operator(self, self._page.answer)
+        self._taps = {
+            topic: self.poll(topic, SAMPLE_TOPICS[topic], _qos(_DEPTHS.get(topic, 1)), raw=True)
+            for topic in KEYS
+        }
+        self.create_subscription(DiagnosticArray, DIAGNOSTICS, self._on_diagnostics, 100)
+        self.create_timer(1.0 / self.parameters.rate, self._update, clock=self.steady_clock)
+        self.create_timer(1.0, self._operator.look, clock=self.steady_clock)
+        print(f'live view: {self._page.address}', flush=True)
+
+    def diagnose(self) -> tuple[bytes, str, Mapping[str, object]]:
+        """Where the page is."""
+        return DiagnosticStatus.OK, self._page.address, {}
+
+    def _serve(self) -> Page:
+        try:
+            from maglev_view.web.page import Page
+        except ModuleNotFoundError as error:
+            if error.name == 'viser':
+                raise NodeError(_MISSING) from error
+            raise
+        return Page(self.parameters, f'maglev stage {self.get_namespace()}'.rstrip('/ '))
+
+    def _update(self) -> None:
+        for topic, tap in self._taps.items():
+            messages = [message for message, _ in tap.take()]
+            try:
+                self._live.take(KEYS[topic], decode(KEYS[topic], messages))
+            except DecodeError as error:
+                self.fail(str(error))
+                return
+        while not self._page.wishes.empty():
+            self._operator.ask(self._page.wishes.get())
+        self._operator.go_on()
+        self._page.show(self._live)
+
+    def _on_diagnostics(self, message: Any) -> None:
+        for status in message.status:
+            values = {each.key: each.value for each in status.values}
+            self._live.told(status.name, status.level[0], status.message, values)
+
+
+def _qos(depth: int) -> QoSProfile:
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=depth,
+        reliability=ReliabilityPolicy.BEST_EFFORT,  # nobody repeats a sample for a view
+        durability=DurabilityPolicy.VOLATILE,
+    )
+
+
+def main() -> None:
+    """Entry point of the executable."""
+    run_main(WebNode, 'web', background=True)
+
+
+if __name__ == '__main__':
+    main()

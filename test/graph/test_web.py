@@ -1,0 +1,99 @@
+"""The live view beside a flight: the page moves, its buttons act, and nobody needs it."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+
+import browser
+import pytest
+from flight import LONG, airborne, fly, landed_without_current, samples
+from graph import Nodes, Observer, Process
+from page_client import PageClient
+
+from maglev_msgs.msg import ControllerState
+from maglev_node.topics import CONTROLLER_STATE
+
+PLATEN = '/stage_link/platen_link'
+AT_REST = -0.031
+
+
+@pytest.fixture
+def flying(nodes: Nodes, watching: Observer) -> Process:
+    """The live view of a flight in the air."""
+    web = nodes.start('web', 'port:=0', 'window:=2.0')
+    fly(nodes, LONG)
+    web.wait_for('live view: ')
+    watching.wait(lambda: airborne(watching))
+    return web
+
+
+def address(web: Process) -> str:
+    return web.output.rpartition('live view: ')[2].split()[0]
+
+
+def mode(observer: Observer) -> int:
+    return int(observer.newest(CONTROLLER_STATE).mode)
+
+
+def heights(page: PageClient) -> list[float]:
+    """Where the platen was put, one after the other [m]."""
+    moved = [m for m in page.of('SetPositionMessage') if m['name'] == PLATEN]
+    return [message['position'][2] for message in moved]
+
+
+def test_the_page_shows_the_flight_and_its_buttons_act(flying: Process, watching: Observer) -> None:
+    page = PageClient(address(flying), origin=address(flying))
+    page.wait(lambda: len(set(heights(page))) > 5)
+    assert all(AT_REST - 1e-4 < z < -0.018 for z in heights(page))
+    page.wait(lambda: 'controller regulating' in page.text() and 'motor 4' in page.text())
+
+    page.press('Emergency stop')
+    watching.wait(lambda: mode(watching) == ControllerState.FAULT)
+    watching.wait(lambda: landed_without_current(watching))
+    page.wait(lambda: '<b>controller</b>: FAULT' in page.text())
+    stranger = PageClient(address(flying), origin='https://elsewhere.example')
+    stranger.wait(lambda: stranger.buttons())
+    stranger.press('Reset')
+    stranger.wait(lambda: 'refused: this page' in stranger.text())
+    assert mode(watching) == ControllerState.FAULT
+    stranger.close()
+    page.press('Reset')
+    watching.wait(lambda: mode(watching) == ControllerState.DISABLED)
+    page.press('Enable')
+    watching.wait(lambda: mode(watching) == ControllerState.WAITING)
+    page.press('Lift off')
+    watching.wait(lambda: airborne(watching))
+    page.close()
+    flying.signal(signal.SIGKILL)
+    assert flying.wait() == 137
+    samples(watching, 500)
+    assert mode(watching) == ControllerState.REGULATING
+
+
+@pytest.mark.alone
+@pytest.mark.skipif(not browser.found(), reason='there is no Chromium or Chrome here')
+def test_in_a_browser_the_scene_moves_and_the_emergency_stop_stops(
+    flying: Process, watching: Observer, tmp_path: Path
+) -> None:
+    page = browser.Browser(tmp_path / 'profile')
+    try:
+        page.open(address(flying))
+        button = '[...document.querySelectorAll("button")].find(b => b.innerText == "%s")'
+        page.wait(button % 'Emergency stop')
+        page.wait('document.body.innerText.includes("controller regulating")')
+        page.wait('document.querySelector("canvas")')
+        first = page.picture(450, 400)  # beside the panel
+        watching.wait(lambda: page.picture(450, 400) != first, 30.0)
+        page.evaluate(f'({button % "Emergency stop"}).click()')
+        watching.wait(lambda: mode(watching) == ControllerState.FAULT)
+        page.wait('document.body.innerText.includes("controller: FAULT")')
+        outside = [
+            url
+            for url in page.requested
+            if not url.startswith((address(flying), address(flying).replace('http', 'ws')))
+            and not url.startswith(('data:', 'blob:', 'about:'))
+        ]
+        assert outside == []
+    finally:
+        page.close()

@@ -1,0 +1,93 @@
+"""A client of the live view's page without a browser: reads what it is sent, presses buttons."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import msgspec
+import viser
+import zstandard
+from websockets.sync.client import connect
+
+
+class PageClient:
+    """What a page would know.
+
+    :param address: of the page, ``http://127.0.0.1:8080``.
+    :param origin: the site that a browser would name as the page's, None for no browser.
+    """
+
+    def __init__(self, address: str, origin: str | None = None) -> None:
+        self._socket = connect(
+            address.replace('http', 'ws'),
+            origin=origin,
+            subprotocols=[f'viser-v{viser.__version__}'],
+            max_size=None,
+        )
+        self.messages: list[dict[str, Any]] = []
+        self._socket.send(msgspec.msgpack.encode(self._camera()))
+
+    def read(self, duration: float) -> None:
+        """Take what comes for some time [s]."""
+        deadline = time.monotonic() + duration
+        while (left := deadline - time.monotonic()) > 0.0:
+            try:
+                frame = self._socket.recv(timeout=left)
+            except TimeoutError:
+                return
+            assert isinstance(frame, bytes)
+            size = int.from_bytes(frame[8:16], 'little')
+            text = zstandard.ZstdDecompressor().decompress(frame[16 : 16 + size])
+            self.messages += msgspec.msgpack.decode(text)['messages']
+
+    def wait(self, condition: Callable[[], Any], timeout: float = 60.0) -> Any:
+        """Read until something holds; what it is."""
+        deadline = time.monotonic() + timeout
+        while not (found := condition()):
+            assert time.monotonic() < deadline, 'it never held'
+            self.read(0.05)
+        return found
+
+    def of(self, kind: str) -> list[dict[str, Any]]:
+        """The messages of one type."""
+        return [message for message in self.messages if message['type'] == kind]
+
+    def buttons(self) -> dict[str, str]:
+        """The buttons' numbers by their labels."""
+        found = self.of('GuiButtonMessage')
+        return {message['props']['label']: message['uuid'] for message in found}
+
+    def press(self, label: str) -> None:
+        """Click a button."""
+        click = {'type': 'GuiUpdateMessage', 'uuid': self.buttons()[label]}
+        self._socket.send(msgspec.msgpack.encode({**click, 'updates': {'value': True}}))
+
+    def text(self) -> str:
+        """All HTML that is shown now, part by part."""
+        shown = {m['uuid']: m['props']['content'] for m in self.of('GuiHtmlMessage')}
+        for message in self.of('GuiUpdateMessage'):
+            if 'content' in message['updates']:
+                shown[message['uuid']] = message['updates']['content']
+        return '\n'.join(shown.values())
+
+    def close(self) -> None:
+        """Leave without a word, as a browser that is closed."""
+        self._socket.socket.close()
+
+    @staticmethod
+    def _camera() -> dict[str, Any]:
+        """With which viser counts a client as connected."""
+        return {
+            'type': 'ViewerCameraMessage',
+            'wxyz': (1.0, 0.0, 0.0, 0.0),
+            'position': (1.0, 1.0, 1.0),
+            'fov': 1.0,
+            'near': 0.1,
+            'far': 10.0,
+            'image_height': 100,
+            'image_width': 100,
+            'look_at': (0.0, 0.0, 0.0),
+            'up_direction': (0.0, 0.0, 1.0),
+        }
