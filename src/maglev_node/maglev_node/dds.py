@@ -9,7 +9,9 @@ from pathlib import Path
 from maglev_node.port_locks import FIRST_PORT, PORTS, free_ports
 
 _VARIABLE = 'FASTRTPS_DEFAULT_PROFILES_FILE'
+_RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
 _PROFILE = Path(__file__).with_name('fastdds.xml')
+_WATCHER = Path(__file__).with_name('fastdds_watcher.xml')
 
 
 def prepare_middleware() -> None:
@@ -25,10 +27,17 @@ def prepare_middleware() -> None:
 def share_no_memory() -> None:
     """Let a process that only watches be heard and told over the network alone.
 
-    Fast DDS waits up to two seconds for one that is killed while it holds what they share in
-    memory, and that wait would be the loop's.
+    A loop that shares memory with one that is killed now and then waits for it, up to two seconds:
+    so long does Fast DDS take to find out. Of no effect where a profile is given.
     """
-    os.environ.setdefault('FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4')
+    given = os.environ.get(_VARIABLE, str(_PROFILE)) != str(_PROFILE)
+    if given or os.environ.get(_RANGE) != 'LOCALHOST':
+        os.environ.setdefault('FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4')
+        return
+    # There rmw_fastrtps adds shared memory whatever is asked for; the profile keeps to this machine
+    # in its place.
+    os.environ[_RANGE] = 'SYSTEM_DEFAULT'
+    os.environ[_VARIABLE] = str(_WATCHER)
 
 
 def local_participants(domain: int) -> int:
