@@ -181,6 +181,7 @@ class Regulator:
         records = self._arrays.records
         records['axes'] = np.zeros((), AXIS)
         records['axes']['fresh'] = True
+        records['axes']['friction'] = self.parameters.friction.initial
         records['sample'] = np.zeros((), SAMPLE)
         self._arrays.xi[:] = 0.0
         if self.foreign is not None:
@@ -329,6 +330,7 @@ def _settings(
     return {
         'machine': machine_to_array(machine_constants(machine)),
         'period': parameters.sample_time,
+        'learns': parameters.learning.period > 0.0,
         'controlled': [axis.controlled for axis in parameters.axes],
         'lower': np.array(machine.lower_limit) - margin,
         'upper': np.array(machine.upper_limit) + margin,

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maglev_controller.foreign_law import Law
+from maglev_controller.learning import IterativeLearning, iterative_learning
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
 from maglev_model.axes import AXES, FloatArray
@@ -51,13 +52,15 @@ class FlightRecord:
     """What happened in the n samples of a flight; row k is sample k.
 
     ``time`` (n,) [s]; ``phase`` (n,) of :class:`maglev_model.phases.Phase`; ``reference`` what was
-    to be followed, (n, 5) each; ``run`` the true states and the currents.
+    to be followed, (n, 5) each; ``run`` the true states and the currents; ``learning`` what was
+    learned, where ``learning.period`` of the controller asks for it.
     """
 
     time: FloatArray
     phase: NDArray[np.uint8]
     reference: References
     run: Run
+    learning: IterativeLearning | None = None
 
     @property
     def output(self) -> FloatArray:
@@ -121,9 +124,16 @@ def fly(
     assert timeline.end is not None
     block = timeline.block(0, timeline.end + 1)
     references = References(block.position, block.velocity, block.acceleration)
-    outcome = run(Regulator(control_table, law), SimulatedStage(stage_table), references)
+    learning = iterative_learning(control_table)
+    outcome = run(
+        Regulator(control_table, law),
+        SimulatedStage(stage_table),
+        references,
+        learning=learning,
+        follows=block.phase == Phase.TRACK,
+    )
     time = course.sample_time * np.arange(block.phase.size, dtype=np.float64)
-    return FlightRecord(time, block.phase, references, outcome)
+    return FlightRecord(time, block.phase, references, outcome, learning)
 
 
 def _table(
