@@ -25,7 +25,6 @@ from maglev_model.records import Block, Record
 
 _ACROSS = np.array([False, True, True, False, False])
 _PLACE, _REST = 2e-5, 2e-3  # so near x or z may be, and so slow, not to be pushed [m], [m/s]
-_STRAY = (1e-3, 1e-3, 1e-3, 1.5e-3, 3e-3)  # sound amplifiers keep within half of it [m, rad]
 
 LEAST_ATTRACTION = 0.1
 """Share of the weight that is always carried, so that the tilts keep authority."""
@@ -137,7 +136,7 @@ class Landing:
             damping=landing.damping,
             settle_time=landing.settle_time,
             aim=machine.gap_max + landing.depth,
-            stray=_STRAY,
+            stray=landing.stray,
             period=parameters.sample_time,
         )
 

@@ -159,6 +159,14 @@ class BridgeLandingParameters:
         within=(0.1, 1e4),
         length=5,
     )
+    stray: tuple[float, ...] = parameter(
+        (1e-3, 1e-3, 1e-3, 1.5e-3, 3e-3),
+        'farther from its way down the platen is not held any more, and currents are cut; with '
+        'sound amplifiers it stays within half of it' + _BY_AXIS,
+        unit='m, rad',
+        within=(1e-5, 0.1),
+        length=5,
+    )
     rate_bandwidth: float = parameter(
         800.0, 'bandwidth of the rate estimate', unit='rad/s', within=(10.0, 2000.0)
     )
