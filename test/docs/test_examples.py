@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
@@ -20,7 +21,7 @@ NOTEBOOKS = sorted(path.stem for path in FOLDER.glob('*.ipynb'))
 def _figures_are_closed() -> Iterator[None]:
     matplotlib.use('Agg')
     yield
-    matplotlib.pyplot.close('all')
+    plt.close('all')
 
 
 def cells(name: str) -> list[dict[str, Any]]:

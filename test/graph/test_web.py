@@ -84,7 +84,7 @@ def test_in_a_browser_the_scene_moves_and_the_emergency_stop_stops(
         page.wait('document.body.innerText.includes("controller regulating")')
         page.wait('document.querySelector("canvas")')
         first = page.picture(450, 400)  # beside the panel
-        watching.wait(lambda: page.picture(450, 400) != first, 30.0)
+        watching.wait(lambda: page.picture(450, 400) != first)
         page.evaluate(f'({button % "Emergency stop"}).click()')
         watching.wait(lambda: mode(watching) == ControllerState.FAULT)
         page.wait('document.body.innerText.includes("controller: FAULT")')

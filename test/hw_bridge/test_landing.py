@@ -280,3 +280,16 @@ def test_a_landing_that_an_amplifier_defeats_is_given_up(current: float, held: b
     assert ('left its way down' in fault.reason) == fault.cut == (not held)
     assert 'strikes' in fault.reason or held
     assert np.max(np.abs(flight.rig.state[[1, 5]])) < 0.5
+
+
+@pytest.mark.parametrize('gap', [0.025, 0.0285])
+@pytest.mark.parametrize(('current', 'can_be_held'), [(0.2, True), (5.0, False)])
+def test_what_no_motors_can_hold_against_an_amplifier(
+    gap: float, current: float, can_be_held: bool
+) -> None:
+    """Level, the opposite motor must pull as hard; the two then pull more than the weight."""
+    machine = machine_constants(BridgeParameters().machine)
+    angles = np.linspace(0.0, 2.0 * np.pi, 73)
+    share = 2.0 / 3.0 * current  # of a phase alone
+    pull = [-vertical_force(machine, gap, share * np.cos(a), share * np.sin(a)) for a in angles]
+    assert (2.0 * max(pull) < machine.M_y * machine.G) == can_be_held

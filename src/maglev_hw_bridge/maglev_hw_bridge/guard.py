@@ -47,7 +47,6 @@ _DOUBT = 2.5e-5  # an encoder that should have moved this far is not followed [m
 _CERTAIN = 1.5  # as many times max_unseen it is stuck whatever the others read
 _DOUBTFUL_RESIDUAL = 6e-5  # [m]
 _GROUND = 1e-3  # this near the lower stop no gap is at stake any more [m]
-_ROLL_CALL = 3.5e-5  # by when one gap has left its stop, each must have counted [m]
 _LEAP = 3.5e-5  # in a sample no platen leaves it that fast [m]
 _AGREED = 2e-5  # how near the others must read to what is foretold then [m]
 
@@ -58,6 +57,7 @@ class GuardArrays(ObserverArrays):
     max_jump: float  # [m]
     max_residual: float  # [m]
     max_unseen: Annotated[FloatArray, 6]  # [m]
+    roll_call: float  # [m]
     gap_lower: float  # [m]
     gap_upper: float  # [m]
     soft_lower: Annotated[FloatArray, 5]  # y, x, z, phi, theta [m, rad]
@@ -173,7 +173,7 @@ def _roll_call(g: GuardArrays, flying: bool, counted: Flags) -> bool:
         step = g.believed[i] - g.past[0, i]
         g.answered[i] = max(g.answered[i], int(counted[i]))
         g.left[i] = g.left[i] + step if abs(step) < _LEAP else 0.0
-        called = called or (g.trust[i] == SOUND and abs(g.left[i]) > _ROLL_CALL)
+        called = called or (g.trust[i] == SOUND and abs(g.left[i]) > g.roll_call)
     found = False
     for i in range(4):
         if called and g.answered[i] == 0 and g.trust[i] != LOST:
@@ -348,6 +348,7 @@ class Guard:
             max_jump=fault.jump,
             max_residual=fault.residual,
             max_unseen=(fault.stuck_gap,) * 4 + (fault.stuck_horizontal,) * 2,
+            roll_call=fault.roll_call,
             gap_lower=fault.gap_lower,
             gap_upper=fault.gap_upper,
             soft_lower=fault.lower,

@@ -66,6 +66,13 @@ class FaultParameters:
         unit='m',
         within=(1e-6, 0.1),
     )
+    roll_call: float = parameter(
+        3.5e-5,
+        'gap encoders that have not counted when another one has left the lower stop by this are '
+        'stuck',
+        unit='m',
+        within=(1e-6, 0.1),
+    )
     stuck_horizontal: float = parameter(
         1.5e-4,
         'x or z is stuck when it should have moved this far without a count',

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory
 
 from maglev_model.axes import FloatArray
 from maglev_model.controller_watch import NOBODY
@@ -32,6 +33,7 @@ from maglev_node.topics import (
 )
 from maglev_reference.accuracy import summary, warnings
 from maglev_reference.check import UnreachableError
+from maglev_reference.given_points import Point
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.run import ReferenceRun
 from maglev_reference.timeline import Timeline
@@ -83,6 +85,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         REFERENCE: 'published: where the platen shall be, ahead of time',
         MEASUREMENT: 'subscribed: what the encoders read, the newest',
         CONTROLLER_STATE: 'subscribed: whether the controller follows, the newest',
+        '~/trajectory': 'subscribed: trajectory_msgs/JointTrajectory to follow from a hover',
         '~/lift_off': 'std_srvs/Trigger: start from rest',
         '~/land': 'std_srvs/Trigger: land from wherever the platen is',
     }
@@ -107,6 +110,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         self._lockstep = self.parameters.mode == 'lockstep'
         self._measured: Measurement | None = None
         self._published = 0.0  # when, last
+        self.create_subscription(JointTrajectory, '~/trajectory', self._on_trajectory, 1)
         self.create_service(Trigger, '~/lift_off', self._lift_off)
         self.create_service(Trigger, '~/land', self._land)
         self.create_timer(self.parameters.poll_period, self._poll, clock=self.steady_clock)
@@ -123,6 +127,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
             self._watch()
         if self._run.started:
             self._give_way()
+            self._consider()
             self._publish()
             self._follow_phase()
 
@@ -278,6 +283,24 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
             who = 'the stage is gone'
         self.fail(f'no measurement for {silent:.1f} s after sample {self._run.newest}: {who}')
 
+    def _on_trajectory(self, message: JointTrajectory) -> None:
+        """Take a trajectory in; it is checked in pieces, between which the hover goes on."""
+        try:
+            if message.header.stamp.sec or message.header.stamp.nanosec:
+                raise UnreachableError('header.stamp must be 0: it starts at once')
+            self._run.propose(message.joint_names, [_point(each) for each in message.points])
+        except UnreachableError as error:
+            self.get_logger().error(f'trajectory refused: {error}')
+
+    def _consider(self) -> None:
+        try:
+            length = self._run.consider()
+        except UnreachableError as error:
+            self.get_logger().error(f'trajectory refused: {error}')
+            return
+        if length is not None:
+            self.get_logger().info(f'following a trajectory of {length:g} s, then hovering')
+
     def _lift_off(self, _request: Any, response: Any) -> Any:
         until = time.monotonic() + _NEWS_TIME
         while self._run.obstacle()[0] and time.monotonic() < until:
@@ -319,6 +342,11 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         if self._run.left:
             return DiagnosticStatus.WARN, f'left the run: {self._run.left}', facts
         return DiagnosticStatus.OK, 'running', facts
+
+
+def _point(given: Any) -> Point:
+    time = given.time_from_start.sec + 1e-9 * given.time_from_start.nanosec
+    return Point(time, given.positions, given.velocities, given.accelerations)
 
 
 def main() -> None:

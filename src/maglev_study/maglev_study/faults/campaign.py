@@ -10,14 +10,10 @@ from itertools import groupby
 from multiprocessing.synchronize import Event
 from typing import NamedTuple, TypeVar
 
-from maglev_study.faults.flight import Flight
-from maglev_study.faults.fly import Scenario, fly
+from maglev_study.faults.fly import Scenario
 from maglev_study.faults.judge import Verdict
-from maglev_study.faults.kinds import Fault
-from maglev_study.faults.machines import NOMINAL, machine
-from maglev_study.faults.programme import programme
 from maglev_study.faults.shrink import shrink
-from maglev_study.faults.train import fly_all
+from maglev_study.faults.train import fly_all, warm_up
 
 _stop: Event | None = None
 
@@ -44,7 +40,7 @@ class Campaign:
     def __enter__(self) -> Campaign:
         context = multiprocessing.get_context('fork')
         self._stop = context.Event()
-        _warm_up()
+        warm_up()
         self._pool = ProcessPoolExecutor(self._jobs, context, _begin, (self._stop,))
         return self
 
@@ -81,12 +77,6 @@ class Campaign:
             for future in futures:
                 if future not in told and not future.cancelled():
                     heard(future.result())
-
-
-def _warm_up() -> None:
-    """Compile once, before there are processes, all that a run calls from homing to restart."""
-    flight = Flight(machine(NOMINAL), programme(NOMINAL))
-    fly(flight, Scenario(NOMINAL, 'homing', 0.0, (Fault('none'),), 0))
 
 
 def _begin(stop: Event) -> None:
