@@ -124,7 +124,7 @@ check_ros_packages() {
         [[ ! -f $prefix/share/$package/package.xml ]] || found=yes
       done
       [[ -n $found ]] || echo " ros-jazzy-${package//_/-}"
-    done' "$ros_setup" rclpy std_msgs std_srvs diagnostic_msgs rcl_interfaces \
+    done' "$ros_setup" rclpy std_msgs std_srvs diagnostic_msgs rcl_interfaces trajectory_msgs \
     geometry_msgs nav_msgs sensor_msgs visualization_msgs ament_cmake \
     rosidl_default_generators rosidl_default_runtime)
   [[ -z $missing ]] || fail "ROS 2 Jazzy lacks packages: sudo apt install${missing//$'\n'/}"

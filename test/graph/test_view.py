@@ -110,7 +110,7 @@ def test_standard_topics_in_a_namespace(nodes: Nodes, watching: Observer) -> Non
         look()
         return bool(found[TF_STATIC] and found[DESCRIPTION])
 
-    watching.wait(latched_came, 20.0)
+    watching.wait(latched_came)
     assert set(stage.listeners().values()) == {0}, 'it listens while nobody watches it'
     taps |= {topic: watching.node.poll(topic, kind) for topic, (kind, _) in NEEDS.items()}
 
@@ -122,7 +122,7 @@ def test_standard_topics_in_a_namespace(nodes: Nodes, watching: Observer) -> Non
             found[REFERENCE_PATH]
         )
 
-    watching.wait(all_came, 30.0)
+    watching.wait(all_came)
     fine = {topic: find for topic, find in found.items() if topic in (JOINT_STATES, TF, STAGE_POSE)}
     judge_stage(fine)
     judge_reference(found)
@@ -132,7 +132,7 @@ def test_standard_topics_in_a_namespace(nodes: Nodes, watching: Observer) -> Non
     assert frames == {mount.child: mount.parent for mount in mounts(MACHINE)}
     for topic in NEEDS:
         taps.pop(topic).destroy()
-    watching.wait(lambda: set(stage.listeners().values()) == {0}, 20.0)
+    watching.wait(lambda: set(stage.listeners().values()) == {0})
     assert view.running, view.output
 
 

@@ -200,13 +200,96 @@ def test_what_is_not_seen_decides_which_motors_carry(blind: int, carrying: tuple
     assert landing.arrays.descent_start + landing.arrays.descent_time < 0.5
 
 
-def test_what_the_model_does_not_explain_is_made_up_for() -> None:
+def pushed(position: np.ndarray, rate: np.ndarray, push: np.ndarray) -> np.ndarray:
+    """Accelerations y, x, z that a landing begun at 25 mm makes there, one sample later."""
     landing = Landing(BridgeParameters())
-    place, push = np.array([0.025, 0.0, 0.0, 0.0, 0.0]), np.array([1.5, 0.2, 0.0, 0.0, 0.0])
-    landing.begin(place, np.zeros(5))
-    landing.step(place, np.zeros(5), push)
-    machine = machine_constants(BridgeParameters().machine)
-    made = output_accelerations(
-        machine, 0.025, 0.0, 0.0, landing.direct_current, landing.quadrature_current
+    landing.begin(PLACE, np.zeros(5))
+    landing.step(PLACE + position, rate, push)
+    return np.array(
+        output_accelerations(
+            machine_constants(BridgeParameters().machine),
+            PLACE[0] + position[0],
+            0.0,
+            0.0,
+            landing.direct_current,
+            landing.quadrature_current,
+        )[:3]
     )
-    assert made[:2] == pytest.approx((-1.5, -0.2), abs=0.01)
+
+
+PLACE = np.array([0.025, 0.0, 0.0, 0.0, 0.0])
+
+
+def test_what_the_model_does_not_explain_is_made_up_for_along_y_alone() -> None:
+    made = pushed(np.zeros(5), np.zeros(5), np.array([1.5, 0.2, 0.2, 0.0, 0.0]))
+    assert made == pytest.approx((-1.5, 0.0, 0.0), abs=0.01)
+
+
+@pytest.mark.parametrize('axis', [1, 2])
+@pytest.mark.parametrize(
+    ('off', 'speed', 'wanted'),
+    [(1.9e-5, 0.0, 0.0), (2.1e-5, 0.0, -0.0525), (0.0, 1.9e-3, 0.0), (0.0, 2.1e-3, -0.21)],
+)
+def test_x_and_z_that_stand_still_are_not_pushed(
+    axis: int, off: float, speed: float, wanted: float
+) -> None:
+    unit = np.eye(5)[axis]
+    made = pushed(off * unit, speed * unit, np.zeros(5))
+    assert made[axis] == pytest.approx(wanted, abs=1e-6)
+
+
+@pytest.mark.parametrize('axis', [1, 2])
+@pytest.mark.parametrize(('speed', 'braked'), [(1.9e-3, 0.0), (2.1e-3, 3.15e-4)])
+def test_what_hardly_moves_along_x_or_z_is_not_braked(
+    axis: int, speed: float, braked: float
+) -> None:
+    landing = Landing(BridgeParameters())
+    landing.begin(PLACE, speed * np.eye(5)[axis])
+    assert landing.arrays.level[axis] == pytest.approx(braked)
+
+
+@pytest.mark.parametrize('axis', range(5))
+@pytest.mark.parametrize('share', [-0.99, -1.01, 0.99, 1.01])
+def test_a_platen_that_is_not_held_on_its_way_is_noticed(axis: int, share: float) -> None:
+    landing = Landing(BridgeParameters())
+    landing.begin(PLACE, np.zeros(5))
+    bound = (1e-3, 1e-3, 1e-3, 1.5e-3, 3e-3)[axis]
+    landing.step(PLACE + share * bound * np.eye(5)[axis], np.zeros(5), np.zeros(5))
+    assert landing.astray == (abs(share) > 1.0)
+    landing.begin(PLACE, np.zeros(5))
+    assert not landing.astray
+
+
+def stick(flight: Flight, phase: int, current: float) -> None:
+    """Let an amplifier carry a current [A] whatever it is asked for."""
+    flight.rig.arrays.gain[phase] = 1e-9
+    flight.rig.arrays.offset[phase] = -1e9 * current
+
+
+@pytest.mark.parametrize(('current', 'held'), [(-1.0, True), (-5.0, False)])
+def test_a_landing_that_an_amplifier_defeats_is_given_up(current: float, held: bool) -> None:
+    flight = fly(hover(0.025), 250, **{'boards.enable_output': 1})
+    stick(flight, 7, current)
+    flight.run(5)
+    flight.stage.stop()
+    flight.run(40, controlled=False)
+    assert flight.boards.lines.enabled == held
+    fault = flight.stage.fault
+    assert fault is not None
+    assert fault.kind == ('stop' if held else 'current')
+    assert ('left its way down' in fault.reason) == fault.cut == (not held)
+    assert 'strikes' in fault.reason or held
+    assert np.max(np.abs(flight.rig.state[[1, 5]])) < 0.5
+
+
+@pytest.mark.parametrize('gap', [0.025, 0.0285])
+@pytest.mark.parametrize(('current', 'can_be_held'), [(0.2, True), (5.0, False)])
+def test_what_no_motors_can_hold_against_an_amplifier(
+    gap: float, current: float, can_be_held: bool
+) -> None:
+    """Level, the opposite motor must pull as hard; the two then pull more than the weight."""
+    machine = machine_constants(BridgeParameters().machine)
+    angles = np.linspace(0.0, 2.0 * np.pi, 73)
+    share = 2.0 / 3.0 * current  # of a phase alone
+    pull = [-vertical_force(machine, gap, share * np.cos(a), share * np.sin(a)) for a in angles]
+    assert (2.0 * max(pull) < machine.M_y * machine.G) == can_be_held

@@ -128,6 +128,23 @@ def test_a_platen_that_leaves_its_stop_without_current_is_a_fault(
     assert flight.boards.lines.enabled != left
 
 
+@pytest.mark.parametrize(('tilt', 'left'), [(2e-4, False), (1.2e-3, True)])
+@pytest.mark.parametrize('axis', [3, 4])
+@pytest.mark.parametrize('sign', [-1.0, 1.0])
+def test_a_corner_that_leaves_the_stop_is_enough(
+    axis: int, sign: float, tilt: float, left: bool
+) -> None:
+    flight = Flight(hover(LOWER_STOP), {'boards.enable_output': 1})
+    flight.run(20, controlled=False)
+    for share in np.linspace(0.0, 1.0, 100):
+        place = np.array([LOWER_STOP, 0.0, 0.0, 0.0, 0.0])
+        place[axis] = sign * share * tilt
+        flight.rig.place(place - 0.1 * abs(place[axis]) * np.eye(5)[0])
+        flight.stage.read()
+        flight.stage.write(np.zeros(4), np.zeros(4))
+    assert ('left its stop' in str(flight.stage.fault)) == left
+
+
 def test_what_was_moved_while_nobody_looked_has_not_left_its_stop() -> None:
     flight = Flight(hover(LOWER_STOP))
     lift(flight, 1e-4, 2e-3)

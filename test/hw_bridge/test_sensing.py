@@ -10,6 +10,7 @@ import pytest
 from bridge_flight import Flight, ellipse, hover
 
 from maglev_hw_bridge import guard
+from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.stage import Mode
 from maglev_model.parameters import ParameterError
 from maglev_model.stage import StageError
@@ -65,6 +66,50 @@ def test_two_stuck_encoders_are_blamed_alone_and_the_platen_landed(pair: tuple[i
     flight.run(100)
     landed(flight, DEGRADED)
     assert failed(flight) == set(pair)
+
+
+def rising(time: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """At rest on the lower stop for 50 ms, then 2 mm up."""
+    above = min(2.0 * max(time - 0.05, 0.0) ** 2, 2e-3)
+    return np.array([0.031 - above, 0.0, 0.0, 0.0, 0.0]), np.zeros(5), np.zeros(5)
+
+
+@pytest.mark.parametrize('stuck', [s for n in (1, 2, 3) for s in combinations(GAPS, n)])
+def test_a_gap_that_does_not_answer_at_lift_off_is_done_without(stuck: tuple[int, ...]) -> None:
+    flight = Flight(rising)
+    flight.boards.stuck[list(stuck)] = True
+    while flight.stage.fault is None and flight.samples < 250:
+        flight.step()
+    assert flight.rig.state[0] > 0.031 - 1.5e-4
+    landed(flight, NOMINAL)
+    assert failed(flight) == set(stuck)
+
+
+@pytest.mark.parametrize('encoder', GAPS)
+def test_a_gap_is_called_until_it_has_counted(encoder: int) -> None:
+    flight = Flight(rising)
+    flight.run(250)
+    state = flight.stage.guard.arrays
+    assert flight.stage.fault is None
+    assert np.all(state.answered == 1)
+    assert np.min(np.abs(state.left)) > 1e-4
+    flight.boards.stuck[encoder] = True
+    state.answered[encoder] = 0
+    flight.run(1)
+    assert failed(flight) == {encoder}
+
+
+@pytest.mark.parametrize(('leap', 'called'), [(3.4e-5, True), (3.6e-5, False)])
+def test_an_encoder_that_leaps_does_not_call_the_others(leap: float, called: bool) -> None:
+    watched = guard.Guard(BridgeParameters())
+    length, current = np.array([0.031] * 4 + [0.0, 0.0]), np.zeros(12)
+    for flying in (False, False, False, True):
+        watched.watch(length, current, flying)
+    for step in (leap, 0.2e-5):
+        length[1] -= step
+        watched.watch(length, current, True)
+    assert (watched.failed == [0, 2, 3]) == called
+    assert watched.failed in ([0, 2, 3], [])
 
 
 @pytest.mark.parametrize('pair', PAIRS)

@@ -198,6 +198,34 @@ def test_currents_that_a_stage_refuses_are_a_fault_said_once() -> None:
     assert node.errors[0].startswith('fault at sample 2: a current is nan (currents cut)')
 
 
+@pytest.mark.parametrize('cause', ['a sample', 'a command'])
+def test_a_fault_is_said_after_the_output_that_answers_it(
+    cause: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stage, before = MadeUpStage(real=True), []
+    _, node = start_realtime(stage)
+
+    class Log(list[str]):
+        def append(self, text: str) -> None:
+            before.append(stage.calls[-1])
+            super().append(text)
+
+    node.errors = Log()
+    node.tick()
+    for sequence, current in enumerate((0.0, 0.5, 0.5), start=1):
+        node.inbox.messages = [currents(sequence, current)]
+        node.tick()
+    assert stage.flying
+    if cause == 'a sample':
+        sound = stage.read
+        monkeypatch.setattr(stage, 'read', lambda: (stage.stop('it jumped'), sound())[1])
+    else:
+        node.inbox.messages = [currents(4, 0.5, session=2)]
+    node.tick()
+    assert len(node.errors) == 1
+    assert before == ['hold']
+
+
 @pytest.mark.parametrize('real', [False, True])
 def test_unanswered_it_goes_on_until_it_has_landed(
     real: bool, monkeypatch: pytest.MonkeyPatch

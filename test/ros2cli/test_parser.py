@@ -57,7 +57,7 @@ def test_the_documents_are_searched() -> None:
 def test_a_line_of_the_documents(document: str, line: str) -> None:
     words = shlex.split(line, comments=True)[1:]
     given = parser(words).parse_args(words)
-    if given.command == 'run':
+    if given.command == 'run' and given.package_name.startswith('maglev_'):
         assert given.executable_name in executables(given.package_name)
     if 'service_type' in given:
         find_type(given.service_type, 'srv')

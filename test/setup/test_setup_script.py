@@ -113,9 +113,9 @@ def test_a_jazzy_that_lacks_packages(machine: Machine, tmp_path: Path) -> None:
     )
     line = machine.refusal(ROS_DISTRO='jazzy', AMENT_PREFIX_PATH=f'/overlay:{prefix}')
     assert line.endswith(
-        'sudo apt install ros-jazzy-std-srvs ros-jazzy-diagnostic-msgs ros-jazzy-geometry-msgs'
-        ' ros-jazzy-nav-msgs ros-jazzy-sensor-msgs ros-jazzy-visualization-msgs'
-        ' ros-jazzy-rosidl-default-generators'
+        'sudo apt install ros-jazzy-std-srvs ros-jazzy-diagnostic-msgs'
+        ' ros-jazzy-trajectory-msgs ros-jazzy-geometry-msgs ros-jazzy-nav-msgs'
+        ' ros-jazzy-sensor-msgs ros-jazzy-visualization-msgs ros-jazzy-rosidl-default-generators'
     )
 
 

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from rough import PARAMS
 
+from maglev_controller.parameters import ControllerParameters
 from maglev_model.axes import X
-from maglev_study.references import HOVER, held, scan
+from maglev_model.parameters import from_yaml
+from maglev_study.references import HOVER, ellipse, held, scan
 from maglev_study.repeatability import repeatability
 from maglev_study.rough_flights import (
     Experiment,
@@ -93,3 +95,12 @@ def test_positioning_finds_what_the_scale_hides() -> None:
     assert found is not None
     assert found['true'].bias == pytest.approx(1e-3 * 0.8 * 0.02, abs=4e-6)
     assert found['own'].bias < 4e-6
+
+
+def test_without_guides_nanometres_are_left() -> None:
+    """``contactless.yaml`` as it stands: the ellipse within a count of its sensors in the mean."""
+    table = from_yaml(ControllerParameters, 'controller', PARAMS / 'contactless.yaml')
+    experiment = Experiment('ellipse', ellipse(10.0, 0.010, 1e-3, grow=2.0), 3.0)
+    found = fly_rough(plant_of(PARAMS, 'contactless'), table, experiment).true
+    assert found is not None
+    assert np.all(1e9 * found.mean < [8.0, 8.0, 8.0, 25.0, 25.0])

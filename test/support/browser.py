@@ -33,7 +33,7 @@ class Browser:
         options += ['--remote-debugging-port=0', f'--user-data-dir={folder}', '--mute-audio']
         options += ['--window-size=900,500', 'about:blank']
         self._process = subprocess.Popen(
-            ['nice', '-n', '5', found(), *options],
+            ['nice', '-n', '19', found(), *options],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
             start_new_session=True,
@@ -73,6 +73,7 @@ class Browser:
 
     def close(self) -> None:
         """End the browser with all its processes."""
+        self._socket.close()
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait(10)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import time
 from collections.abc import Callable
 from typing import Any
@@ -73,7 +74,9 @@ class PageClient:
         return '\n'.join(shown.values())
 
     def close(self) -> None:
-        """Leave without a word, as a browser that is closed."""
+        """Leave without a word, as a browser that is killed."""
+        self._socket.socket.shutdown(socket.SHUT_RDWR)
+        self._socket.recv_events_thread.join(10)
         self._socket.socket.close()
 
     @staticmethod

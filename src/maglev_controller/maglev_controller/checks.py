@@ -46,6 +46,11 @@ def check_foreign(parameters: ControllerParameters) -> None:
             "parameter 'inverse' is 'equilibrium', but the regulator lands by itself when the law "
             f"'{parameters.law}' fails, and for that takes 'exact' or 'simplified'"
         )
+    if parameters.learning.period > 0.0:
+        raise ParameterError(
+            f"parameter 'learning.period' is {parameters.learning.period:g} s, but what is learned "
+            f"is fed forward by the regulator's own laws, not by '{parameters.law}': it takes 0"
+        )
     if parameters.foreign.time > parameters.sample_time:
         raise ParameterError(
             f"parameter 'foreign.time' is {parameters.foreign.time:g} s, it must not be more than "

@@ -74,6 +74,7 @@ SETTINGS: Final = np.dtype(
         ('notches', 'i8', 5),  # how many
         ('notch', 'f8', (5, MOST, 5)),  # their coefficients, as of Notch
         ('winding', WINDING),
+        ('learns', '?'),  # whether what repeats is learned, iteratively
         ('friction_gain', 'f8'),  # share of what is missing that is learned in a sample, 0: none
         ('friction_way', 'f8', 5),  # [m, rad]
         ('friction_limit', 'f8', 5),  # [m/s², rad/s²]
@@ -107,6 +108,7 @@ AXIS: Final = np.dtype(
         ('bristle', 'f8'),  # friction's shape, -1 to 1, in the direction of motion
         ('friction', 'f8'),  # its level as learned [m/s², rad/s²]
         ('load', 'f8'),  # what else acts against the motion, likewise
+        ('learned', 'f8'),  # fed forward against what repeats [m/s², rad/s²]
         ('notch', 'f8', (MOST, 2)),  # states of the notches
         ('bump', 'f8'),  # part of w that fades, so that w does not jump when gains change
     ],

@@ -68,8 +68,10 @@ def observe(settings: Record, axis: Record, index: int) -> tuple[float, float]:
 def predict(settings: Record, axis: Record, realised: float) -> None:
     """Carry the estimate over to the next sample, its input known."""
     acceleration = realised
+    if settings.learns:  # what is fed forward against other forces moves nothing
+        acceleration -= axis.learned + axis.friction * axis.bristle
     if settings.late:
-        acceleration, axis.pending_acceleration = axis.pending_acceleration, realised
+        acceleration, axis.pending_acceleration = axis.pending_acceleration, acceleration
     period = settings.period
     axis.estimated_position += period * (axis.estimated_velocity + 0.5 * period * acceleration)
     axis.estimated_velocity += period * acceleration

@@ -93,10 +93,13 @@ class ForeignLaw:
     """
 
     def __init__(
-        self, make: Callable[[ControllerParameters], Law], parameters: ControllerParameters
+        self,
+        make: Callable[[ControllerParameters], Law],
+        parameters: ControllerParameters,
+        name: str = '',
     ) -> None:
         """Make the law and ask it once, at rest. Raises ParameterError when that fails."""
-        self.name = parameters.law
+        self.name = name or parameters.law
         self.parameters = parameters
         self.hurried = False
         given = f"parameter 'law' is '{self.name}'"

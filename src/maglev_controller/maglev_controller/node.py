@@ -73,6 +73,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         '~/enable': 'std_srvs/SetBool: follow the reference; false: land',
         '~/emergency_stop': 'std_srvs/Trigger: land, and end in a fault',
         '~/reset': 'std_srvs/Trigger: clear a fault',
+        '~/learn': 'std_srvs/SetBool: learn over the next passes; false: no more',
     }
 
     def __init__(self) -> None:
@@ -88,6 +89,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         self._pending: Measurement | None = None
         self._pending_since = self._answered = 0.0
         self._reference_lost = self._reference_over = self._silent = False
+        self._passes = 0  # learned from, when last looked at
         self._logged = (self.supervisor.mode, self.supervisor.reason)
         self._currents, self._state = Currents(), ControllerState()
         self._currents.session = secrets.randbits(64) | 1
@@ -107,6 +109,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
             self.create_service(SetBool, '~/enable', self._on_enable),
             self.create_service(Trigger, '~/reset', self._on_reset),
         )
+        self.create_service(SetBool, '~/learn', self._on_learn)
         self.create_timer(_REFERENCE_PERIOD, self._take_references, clock=self.steady_clock)
         self.create_timer(_WATCH_PERIOD, self._watch, clock=self.steady_clock)
         self.take_realtime_priority()
@@ -206,6 +209,8 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         self._publish_state(sequence)
         if (supervisor.mode, supervisor.reason) != self._logged:
             self._log_change()
+            if not supervisor.flying:
+                self._save_learned()
 
     def _publish_currents(self, sequence: int) -> None:
         message = self._currents
@@ -274,6 +279,32 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
     def _on_reset(self, _request: Any, response: Any) -> Any:
         response.success, response.message = self.supervisor.reset_fault()
         return response
+
+    def _on_learn(self, request: Any, response: Any) -> Any:
+        learning = self.supervisor.learning
+        response.success = learning is not None and self.parameters.learning.passes > 0
+        if learning is None or not response.success:
+            response.message = "nothing repeats: give 'learning.period' and 'learning.passes'"
+        elif request.data:
+            learning.begin()
+            response.message = f'learning over {self.parameters.learning.passes} passes'
+        else:
+            learning.end()
+            response.message = learning.describe()
+        return response
+
+    def _save_learned(self) -> None:
+        """On the ground, where the time does not matter."""
+        learning, path = self.supervisor.learning, self.parameters.learning.file
+        if learning is None or len(learning.history) in (0, self._passes):
+            return
+        self._passes = len(learning.history)
+        self.get_logger().info(learning.describe())
+        try:
+            if path:
+                learning.save(path)
+        except OSError as error:
+            self.get_logger().error(f'what was learned is not saved: {error}')
 
     def _answer_pending(self) -> None:
         if self._pending is not None and not self._awaits_reference(self._pending.sequence):

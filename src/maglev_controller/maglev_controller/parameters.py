@@ -11,6 +11,7 @@ import math
 from maglev_controller.design.notch import MOST
 from maglev_controller.design.state_space import Mode
 from maglev_controller.foreign_law import ForeignLawParameters
+from maglev_controller.learning_parameters import LearningParameters
 from maglev_model.loop_parameters import AxisLoopParameters, FundamentalParameters
 from maglev_model.machine import MachineParameters
 from maglev_model.parameters import ParameterError, group, parameter
@@ -236,6 +237,13 @@ class FrictionParameters:
         within=(1e-8, 1.0),
         length=5,
     )
+    initial: tuple[float, ...] = parameter(
+        (0.0, 0.0, 0.0, 0.0, 0.0),
+        'level that it begins with at every enable, per axis',
+        unit='m/s^2, rad/s^2',
+        within=(0.0, 100.0),
+        length=5,
+    )
     largest: tuple[float, ...] = parameter(
         (1.0, 1.0, 1.0, 5.0, 5.0),
         'level that is learned at most, per axis',
@@ -396,6 +404,7 @@ class ControllerParameters:
     friction: FrictionParameters = group(FrictionParameters)
     modes: ModeParameters = group(ModeParameters)
     winding: WindingParameters = group(WindingParameters)
+    learning: LearningParameters = group(LearningParameters)
     y: AxisParameters = group(AxisParameters)
     x: AxisParameters = group(AxisParameters)
     z: AxisParameters = group(AxisParameters)

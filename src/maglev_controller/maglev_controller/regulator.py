@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maglev_controller.bumpless_transfer import ModelMaps, carry_over, check_retuning, model_maps
+from maglev_controller.checks import check_foreign
 from maglev_controller.control_arrays import (
     AXIS,
     INVERSES,
@@ -31,7 +32,7 @@ from maglev_controller.design.axis_design import AxisDesign
 from maglev_controller.design.margins import LoopMargins, all_margins, check_margins
 from maglev_controller.design.observer import NO_OBSERVER
 from maglev_controller.estimation import DOUBT
-from maglev_controller.foreign_law import ForeignLaw
+from maglev_controller.foreign_law import ForeignLaw, Law
 from maglev_controller.foreign_sample import (
     TOLD,
     close_by_itself,
@@ -73,13 +74,23 @@ class Regulator:
     answers are taken in place of the regulator's own until it fails, or :meth:`fall_back`.
     """
 
-    def __init__(self, parameters: ControllerParameters) -> None:
-        """Design all axes. Raises ``ParameterError`` with the reason for what cannot be had."""
+    def __init__(self, parameters: ControllerParameters, law: Law | None = None) -> None:
+        """Design all axes; with ``law`` that object answers, and what is designed lands.
+
+        Raises ``ParameterError`` with the reason for what cannot be had.
+        """
         self.parameters = parameters
-        law = control_law(parameters)
-        if law.make is not None:  # what runs along has to follow what acts in its place
+        self._given = law
+        chosen = control_law(parameters)
+        if law is not None:
+            check_foreign(parameters)
+        if (
+            law is not None or chosen.make is not None
+        ):  # what runs along has to follow what acts in its place
             parameters = replace(parameters, {'internal_model.antiwindup': 'observer'})
-        self.designs: tuple[AxisDesign, ...] = tuple(law.design(parameters, name) for name in AXES)
+        self.designs: tuple[AxisDesign, ...] = tuple(
+            chosen.design(parameters, name) for name in AXES
+        )
         self.margins: tuple[LoopMargins, ...] = all_margins(parameters, self.designs)
         for name, margins, axis in zip(AXES, self.margins, parameters.axes, strict=True):
             if axis.controlled:
@@ -93,8 +104,13 @@ class Regulator:
 
         Raises ``ParameterError`` when that cannot be made.
         """
-        make = find_law(self.parameters.law).make
-        self.foreign = None if make is None else ForeignLaw(make, self.parameters)
+        given, make = self._given, find_law(self.parameters.law).make
+        if given is not None:
+            self.foreign: ForeignLaw | None = ForeignLaw(
+                lambda _: given, self.parameters, type(given).__name__
+            )
+        else:
+            self.foreign = None if make is None else ForeignLaw(make, self.parameters)
 
     def _use(self, arrays: ControlArrays) -> None:
         self._arrays = arrays
@@ -107,11 +123,12 @@ class Regulator:
 
     def __getstate__(self) -> tuple[Any, ...]:
         """What goes to another process; the readable arrays are views and made again there."""
-        return self.parameters, self.designs, self.margins, self._arrays, self.foreign
+        given = self._given, self.foreign
+        return self.parameters, self.designs, self.margins, self._arrays, *given
 
     def __setstate__(self, state: tuple[Any, ...]) -> None:
         """Come back from another process."""
-        self.parameters, self.designs, self.margins, arrays, self.foreign = state
+        self.parameters, self.designs, self.margins, arrays, self._given, self.foreign = state
         self._use(arrays)
 
     @property
@@ -164,6 +181,7 @@ class Regulator:
         records = self._arrays.records
         records['axes'] = np.zeros((), AXIS)
         records['axes']['fresh'] = True
+        records['axes']['friction'] = self.parameters.friction.initial
         records['sample'] = np.zeros((), SAMPLE)
         self._arrays.xi[:] = 0.0
         if self.foreign is not None:
@@ -312,6 +330,7 @@ def _settings(
     return {
         'machine': machine_to_array(machine_constants(machine)),
         'period': parameters.sample_time,
+        'learns': parameters.learning.period > 0.0,
         'controlled': [axis.controlled for axis in parameters.axes],
         'lower': np.array(machine.lower_limit) - margin,
         'upper': np.array(machine.upper_limit) + margin,

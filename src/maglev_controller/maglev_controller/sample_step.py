@@ -156,6 +156,10 @@ def _virtual_input(
     if settings.observed[index]:
         seen, seen_velocity = observe(settings, axis, index)
         error, error_rate = seen - position - to_position, seen_velocity - smooth_velocity
+        if settings.late:  # what is seen is the next sample
+            period, bend = settings.period, axis.wanted_acceleration
+            error -= period * (smooth_velocity + 0.5 * period * bend)
+            error_rate -= period * bend
     else:
         change = measured - axis.filtered_position
         axis.filtered_position += forget * change
@@ -170,6 +174,8 @@ def _virtual_input(
     sample.error_rate[index] = error_rate
     ahead = to_acceleration + settings.feed_forward * acceleration
     sample.virtual_input[index] = w + ahead + friction_ahead(settings, axis, index)
+    if settings.learns:
+        sample.virtual_input[index] += axis.learned
 
 
 @compiled

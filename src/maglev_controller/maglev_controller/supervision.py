@@ -7,6 +7,7 @@ import numpy as np
 from maglev_controller.bumpless_transfer import ModelMaps, check_retuning
 from maglev_controller.design_process import DesignProcess
 from maglev_controller.landing import Landing
+from maglev_controller.learning import iterative_learning
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.platen_lost import PlatenWatch
 from maglev_controller.reference_buffer import ReferenceBuffer
@@ -26,7 +27,8 @@ class Supervisor:
     so while the measurement can be believed every way out of flight is a landing; when it cannot,
     :attr:`status` says that the controller has given up, and the stage lands as it can.
     ``direct_current`` and ``quadrature_current`` (4,) [A] hold the answer of the last :meth:`step`,
-    ``limited_by`` what limited it, as bits of :mod:`maglev_model.inverse`.
+    ``limited_by`` what limited it, as bits of :mod:`maglev_model.inverse`. ``learning`` is what
+    learns while the reference tracks, None where nothing repeats.
     """
 
     def __init__(
@@ -34,10 +36,11 @@ class Supervisor:
     ) -> None:
         """With ``hurried`` the stage does not wait for an answer, so that a law can be late.
 
-        Raises ParameterError when the regulator cannot be designed.
+        Raises ParameterError when the regulator cannot be designed, or the learning.
         """
         self.parameters = parameters
         self.regulator = Regulator(parameters)
+        self.learning = iterative_learning(parameters)
         self.references = ReferenceBuffer()
         self.mode = Mode.WAITING if enabled else Mode.DISABLED
         self.reason = '' if enabled else 'not enabled'
@@ -67,7 +70,7 @@ class Supervisor:
         Landing(self.parameters, rest, np.zeros(5), np.zeros(5)).step()
         self._platen_watch.step(self.regulator.position, self.regulator.error)
         self._platen_watch.reset()
-        self.regulator.reset()
+        self._start_afresh()
         self._no_current()
 
     @property
@@ -102,6 +105,8 @@ class Supervisor:
             regulator.take_over(self.regulator, maps)
         else:
             regulator.make_foreign()
+            if self.learning is not None:
+                self.learning = self.learning.redesigned(regulator.parameters)
         self.regulator, self.parameters = regulator, regulator.parameters
         self._platen_watch = PlatenWatch(regulator.parameters)
         self._lower_stop = regulator.parameters.machine.gap_max
@@ -189,9 +194,14 @@ class Supervisor:
         if not self._wants_current(row):
             self._may_lift_off = True
         elif self._may_lift_off:
-            self.regulator.reset()
+            self._start_afresh()
             self._platen_watch.reset()
             self.mode = Mode.REGULATING
+
+    def _start_afresh(self) -> None:
+        self.regulator.reset()
+        if self.learning is not None:
+            self.learning.rest()
 
     def _wants_current(self, row: int) -> bool:
         return self.references.phase[row] not in (Phase.REST, Phase.END)
@@ -218,6 +228,7 @@ class Supervisor:
             references.position[row],
             references.velocity[row],
             references.acceleration[row],
+            references.phase[row] == Phase.TRACK,
         )
         if self.regulator.fault and self.mode == Mode.REGULATING:
             self.stop(self.regulator.fault)
@@ -253,7 +264,10 @@ class Supervisor:
         position: FloatArray,
         velocity: FloatArray,
         acceleration: FloatArray,
+        repeats: bool = False,
     ) -> None:
+        if self.learning is not None:
+            self.learning.look_ahead(self.regulator.arrays, repeats)
         try:
             self.limited_by = self.regulator.step(
                 gap,
@@ -267,6 +281,9 @@ class Supervisor:
             )
         except MeasurementFault as fault:
             self.give_up(str(fault))
+            return
+        if self.learning is not None:
+            self.learning.learn(self.regulator.arrays)
 
     def _no_current(self) -> None:
         self.direct_current[:] = 0.0

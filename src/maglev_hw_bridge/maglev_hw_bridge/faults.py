@@ -91,6 +91,12 @@ def astray_fault(watched: Guard) -> tuple[str, str]:
     return reason, 'check the amplifiers, one may be stuck on, and the gap encoders'
 
 
+def stray_fault() -> tuple[str, str]:
+    """Reason and remedy of a landing that is given up, as the amplifiers do not hold the platen."""
+    reason = 'the platen left its way down, pulled by what was not commanded'
+    return reason, 'check the amplifiers, one may be stuck on, and the encoders'
+
+
 def remaining_cause(
     parameters: BridgeParameters, stop_pressed: bool, watched: Guard, amplifier: Amplifiers
 ) -> str:

@@ -2,8 +2,9 @@
 
 The observer foretells what each encoder reads next. A reading that leaps away from that slipped: it
 is put right by as much and goes on being believed, until it leaps again. One that stands still
-while the platen moves is stuck, and done without. With one gap in doubt the other three show how
-the platen moves; with more, the model must agree with those that are left.
+while the platen moves is stuck, and done without. At lift-off the gap encoders are called by roll.
+With one gap in doubt the other three show how the platen moves; with more, the model must agree
+with those that are left.
 """
 
 from __future__ import annotations
@@ -46,6 +47,7 @@ _DOUBT = 2.5e-5  # an encoder that should have moved this far is not followed [m
 _CERTAIN = 1.5  # as many times max_unseen it is stuck whatever the others read
 _DOUBTFUL_RESIDUAL = 6e-5  # [m]
 _GROUND = 1e-3  # this near the lower stop no gap is at stake any more [m]
+_LEAP = 3.5e-5  # in a sample no platen leaves it that fast [m]
 _AGREED = 2e-5  # how near the others must read to what is foretold then [m]
 
 
@@ -55,6 +57,7 @@ class GuardArrays(ObserverArrays):
     max_jump: float  # [m]
     max_residual: float  # [m]
     max_unseen: Annotated[FloatArray, 6]  # [m]
+    roll_call: float  # [m]
     gap_lower: float  # [m]
     gap_upper: float  # [m]
     soft_lower: Annotated[FloatArray, 5]  # y, x, z, phi, theta [m, rad]
@@ -72,6 +75,8 @@ class GuardArrays(ObserverArrays):
     rigid: bool  # whether four believed gaps must be those of a rigid platen
     residual_then: Annotated[FloatArray, 4]  # when a gap encoder counted last [m]
     unseen: Annotated[FloatArray, 6]  # how far it should have moved at least since its last count
+    answered: Annotated[NDArray[np.int8], 4]  # gaps that have counted since the platen rested
+    left: Annotated[FloatArray, 4]  # and by how much, leaps aside [m]
 
 
 @compiled
@@ -100,6 +105,19 @@ def _at_rest(g: GuardArrays, i: int) -> bool:
 
 
 @compiled
+def _drift(g: GuardArrays, i: int) -> float:
+    """How far friction may carry what an encoder should read off the model in probation [m]."""
+    if i >= 4:
+        held = g.friction[i - 3]
+    else:
+        held = (
+            g.friction[Y]
+            + machine_from_array(g.machine).r * g.friction[PHI if i % 2 == 0 else THETA]
+        )
+    return float(0.5 * held * (_PROBATION * g.period) ** 2)
+
+
+@compiled
 def _slips(g: GuardArrays) -> bool:
     """Find and put right what leaps; whether there is some."""
     found = False
@@ -107,7 +125,7 @@ def _slips(g: GuardArrays) -> bool:
         step = g.believed[i] - g.past[0, i]
         error = step - g.step[i]
         again = step - (g.past[0, i] - g.past[1, i])
-        away = g.probation[i] == 1 and abs(g.believed[i] - g.length[i]) > g.max_jump
+        away = g.probation[i] == 1 and abs(g.believed[i] - g.length[i]) > g.max_jump + _drift(g, i)
         if g.trust[i] == LOST or (min(abs(error), abs(again)) <= g.max_jump and not away):
             continue
         found, g.blamed[i] = True, 1
@@ -133,6 +151,37 @@ def _look(g: GuardArrays, flying: bool, counted: Flags) -> None:
         if i < 4 and (counted[i] or not g.rigid):
             g.residual_then[i] = residual
         g.probation[i] = max(g.probation[i] - 1, 0)
+
+
+@compiled
+def _await_lift_off(g: GuardArrays) -> None:
+    g.answered[:], g.left[:] = int(not observer.supported(g, Y)), 0.0
+
+
+@compiled
+def _roll_call(g: GuardArrays, flying: bool, counted: Flags) -> bool:
+    """Do without gap encoders that do not answer when the platen lifts off; whether there are some.
+
+    Two that are stuck look like a tilt, which the controller undoes by one that nobody sees: soon
+    neither the others nor, with the stop's support unknown, the model could tell.
+    """
+    if not flying:
+        _await_lift_off(g)
+        return False
+    called = False
+    for i in range(4):
+        step = g.believed[i] - g.past[0, i]
+        g.answered[i] = max(g.answered[i], int(counted[i]))
+        g.left[i] = g.left[i] + step if abs(step) < _LEAP else 0.0
+        called = called or (g.trust[i] == SOUND and abs(g.left[i]) > g.roll_call)
+    found = False
+    for i in range(4):
+        if called and g.answered[i] == 0 and g.trust[i] != LOST:
+            g.trust[i], g.blamed[i], found = LOST, 1, True
+    if found:
+        observer.bound_disturbance(g, PHI)
+        observer.bound_disturbance(g, THETA)
+    return found
 
 
 @compiled
@@ -231,6 +280,7 @@ def _begin(g: GuardArrays) -> None:
         observer.start(g, g.believed)
         g.past[0] = g.believed
         g.residual_then[:] = _residual(g.believed)
+        _await_lift_off(g)
     else:
         before = g.position.copy()
         observer.start(g, g.believed)
@@ -245,8 +295,9 @@ def _judge(g: GuardArrays, current: FloatArray, flying: bool) -> int:
     observer.predict(g, current)
     code = JUMP if _slips(g) else FINE
     _look(g, flying, counted)
+    missing = _roll_call(g, flying, counted)
     doubt = _doubt(g, flying, doubted)
-    if _stick(g, doubted, doubt) and code == FINE:
+    if (_stick(g, doubted, doubt) or missing) and code == FINE:
         code = STUCK
     for i in range(6):
         used[i] = g.trust[i] != LOST and g.probation[i] == 0 and not doubted[i]
@@ -297,6 +348,7 @@ class Guard:
             max_jump=fault.jump,
             max_residual=fault.residual,
             max_unseen=(fault.stuck_gap,) * 4 + (fault.stuck_horizontal,) * 2,
+            roll_call=fault.roll_call,
             gap_lower=fault.gap_lower,
             gap_upper=fault.gap_upper,
             soft_lower=fault.lower,

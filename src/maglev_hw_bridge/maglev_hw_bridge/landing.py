@@ -14,7 +14,7 @@ import numpy as np
 
 from maglev_hw_bridge.observer import Flags
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_model.axes import FloatArray
+from maglev_model.axes import FloatArray, X, Z
 from maglev_model.compiled import compiled
 from maglev_model.inverse import Answer, CurrentLimits, exact_inverse
 from maglev_model.machine import Machine, machine_constants
@@ -22,6 +22,9 @@ from maglev_model.machine_array import MachineArray, machine_from_array
 from maglev_model.platen import output_accelerations
 from maglev_model.quintic import braking_times, quintic_to_zero
 from maglev_model.records import Block, Record
+
+_ACROSS = np.array([False, True, True, False, False])
+_PLACE, _REST = 2e-5, 2e-3  # so near x or z may be, and so slow, not to be pushed [m], [m/s]
 
 LEAST_ATTRACTION = 0.1
 """Share of the weight that is always carried, so that the tilts keep authority."""
@@ -62,6 +65,8 @@ class LandingArrays(Record):
     settle_time: float  # [s]
     aim: float  # of the descent [m]
     period: float  # [s]
+    stray: Annotated[FloatArray, 5]  # farther from it the platen is not held any more [m, rad]
+    astray: bool  # it is, a result
     direct: Annotated[FloatArray, 4]  # i_d of motors 1..4 [A], the result
     quadrature: Annotated[FloatArray, 4]  # i_q
 
@@ -71,7 +76,9 @@ def land(block: Block, position: FloatArray, rate: FloatArray, disturbance: Floa
     """Write the currents of the next sample of the way down; true when the landing is over.
 
     ``position``, ``rate`` and ``disturbance`` (5,) [m, rad] and by s and s². No motor gets more
-    than the limit, and what carries comes first.
+    than the limit, and what carries comes first. Along x and z what stands still is not pushed, and
+    no friction made up for, which would grow with the push: should the encoder be stuck, the platen
+    would at last slide off unseen.
     """
     landing: LandingArrays = block[0]
     landing.elapsed += landing.period
@@ -91,12 +98,17 @@ def land(block: Block, position: FloatArray, rate: FloatArray, disturbance: Floa
                 time - landing.descent_start,
             )
             target = landing.aim + left
+        if abs(target - position[axis]) > landing.stray[axis]:
+            landing.astray = True
         wanted[axis] = (
             acceleration
-            - disturbance[axis]
             + landing.damping[axis] * (velocity - rate[axis])
             + landing.stiffness[axis] * (target - position[axis])
         )
+        if axis not in (X, Z):
+            wanted[axis] -= disturbance[axis]
+        elif abs(target - position[axis]) < _PLACE and abs(velocity) + abs(rate[axis]) < _REST:
+            wanted[axis] = 0.0
     exact_inverse(
         machine_from_array(landing.machine),
         CurrentLimits(landing.current_limit, 1.0, LEAST_ATTRACTION, landing.along_z),
@@ -124,8 +136,14 @@ class Landing:
             damping=landing.damping,
             settle_time=landing.settle_time,
             aim=machine.gap_max + landing.depth,
+            stray=landing.stray,
             period=parameters.sample_time,
         )
+
+    @property
+    def astray(self) -> bool:
+        """Whether the platen has left the way down, pulled by what was not commanded."""
+        return self.arrays.astray
 
     @property
     def direct_current(self) -> FloatArray:
@@ -145,6 +163,7 @@ class Landing:
         of a tilt that is not known the less its motors pull: that decides which pair carries.
         """
         way, landing = self.arrays, self._parameters
+        rate = np.where(_ACROSS & (np.abs(rate) < _REST), 0.0, rate)
         hurried = bool(np.any(blind))
         way.descent_start = landing.blind_braking_time if hurried else landing.braking_time
         way.descent_time = landing.blind_descent_time if hurried else landing.descent_time
@@ -156,7 +175,7 @@ class Landing:
         way.level[3:] = 0.0
         way.offset[:] = position - way.level
         way.speed[:] = rate
-        way.elapsed = 0.0
+        way.elapsed, way.astray = 0.0, False
 
     def step(self, position: FloatArray, rate: FloatArray, disturbance: FloatArray) -> bool:
         """Compute the currents of the next sample; true when the landing is over."""

@@ -66,6 +66,13 @@ class FaultParameters:
         unit='m',
         within=(1e-6, 0.1),
     )
+    roll_call: float = parameter(
+        3.5e-5,
+        'gap encoders that have not counted when another one has left the lower stop by this are '
+        'stuck',
+        unit='m',
+        within=(1e-6, 0.1),
+    )
     stuck_horizontal: float = parameter(
         1.5e-4,
         'x or z is stuck when it should have moved this far without a count',
@@ -150,6 +157,14 @@ class BridgeLandingParameters:
         'acceleration per error rate' + _BY_AXIS,
         unit='1/s',
         within=(0.1, 1e4),
+        length=5,
+    )
+    stray: tuple[float, ...] = parameter(
+        (1e-3, 1e-3, 1e-3, 1.5e-3, 3e-3),
+        'farther from its way down the platen is not held any more, and currents are cut; with '
+        'sound amplifiers it stays within half of it' + _BY_AXIS,
+        unit='m, rad',
+        within=(1e-5, 0.1),
         length=5,
     )
     rate_bandwidth: float = parameter(

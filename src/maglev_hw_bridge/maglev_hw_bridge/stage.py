@@ -24,6 +24,7 @@ FloatArray = NDArray[np.float64]
 
 _ON_THE_STOP, _AT_REST = 1e-5, 3e-3  # nearer the lower stop and slower it rests [m], [m/s]
 _NEAR, _STILL, _REST_TIME = 2e-4, 1e-5, 0.1  # so it does where it moves no more there [m, m, s]
+_CORNERS = np.array([[-1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, -1.0]])  # (5): gaps by phi, theta
 _LEFT, _SOON = 3e-4, 0.02  # what rested and is, or soon will be, farther has left it [m], [s]
 
 
@@ -164,9 +165,15 @@ class BridgeStage(StageLife):
             self._still_samples, self._still_at = 0, y
         begun = self.guard.arrays.samples > 1  # what rested in a life before may have been moved
         self._rests = begun and not self.flying and (self._rests or self._on_the_stop())
-        soon = above - _SOON * self.guard.arrays.rate[0]
-        if self.mode is Mode.FOLLOWING and self._rests and max(above, soon) > _LEFT:
+        if self.mode is Mode.FOLLOWING and self._rests and self._leaves():
             self._raise_fault('current', *faults.astray_fault(self.guard))
+
+    def _leaves(self) -> bool:
+        """Whether a corner of a platen that rested is off the lower stop, or soon will be."""
+        state = self.guard.arrays
+        tilting = self.parameters.machine.radius * state.rate[3:] @ _CORNERS
+        above = self._lower_stop - state.length[:4]
+        return bool(np.max(above - _SOON * np.minimum(state.rate[0] + tilting, 0.0)) > _LEFT)
 
     def _on_the_stop(self) -> bool:
         """Whether the platen rests on its lower stop, so that nothing falls without current."""
@@ -192,6 +199,9 @@ class BridgeStage(StageLife):
         too_long = stopping and self._landing_samples > self._longest_stop
         if self.landing.step(state.position, state.rate, state.disturbance) or too_long:
             self._disable()
+            return
+        if self.landing.astray:
+            self._raise_fault('current', *faults.stray_fault(), cut=True)
             return
         x, z = state.believed[4], state.believed[5]
         i_d, i_q = self.landing.direct_current, self.landing.quadrature_current

@@ -232,7 +232,6 @@ class Sampling(Generic[P, S]):
             self.sequence += 1
             self._sample_time = time.monotonic()
             self._publish()
-        self._report()
 
     def _publish(self) -> None:
         if self._sample is not None:
@@ -257,7 +256,6 @@ class Sampling(Generic[P, S]):
         )
         if verdict is Verdict.REFUSED and self.stage.fault is None:
             self.stage.stop(controller.why, kind='controller', remedy=_REMEDY)
-            self._report()
         return verdict
 
     def _write(self, message: Currents) -> None:
@@ -293,13 +291,14 @@ class Sampling(Generic[P, S]):
     def _lose(self, error: StageError) -> None:
         """The stage cannot go on: that ends the node, unless a reset can bring it back."""
         self._lost = True
+        self._report()
         if self._timer is not None:
             self._timer.cancel()
         if not self.stage.restartable:
             self._node.fail(str(error))
 
     def _report(self) -> None:
-        """Say a new fault, once."""
+        """Say a new fault, once; where outputs can still answer it, after they have."""
         fault = self.stage.fault
         if fault is not self._reported:
             self._reported = fault

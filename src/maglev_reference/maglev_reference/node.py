@@ -10,8 +10,10 @@ from typing import Any, ClassVar
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory
 
 from maglev_model.axes import FloatArray
+from maglev_model.controller_watch import NOBODY
 from maglev_model.geometry import outputs_of_gaps
 from maglev_model.modes import Mode
 from maglev_model.parameters import parameter
@@ -31,10 +33,12 @@ from maglev_node.topics import (
 )
 from maglev_reference.accuracy import summary, warnings
 from maglev_reference.check import UnreachableError
+from maglev_reference.given_points import Point
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.run import ReferenceRun
 from maglev_reference.timeline import Timeline
 
+_LOOK_PERIOD = 0.25  # between two looks at the graph while the stage is flown [s]
 _REMINDER = 5.0  # between two lines about what is waited for [s]
 _IDLE_PERIOD = 0.02  # from one sample to the next while nothing shall move, in lockstep [s]
 _NEWS_TIME = 0.2  # in which an answer shows what a call has changed in the controller [s]
@@ -81,6 +85,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         REFERENCE: 'published: where the platen shall be, ahead of time',
         MEASUREMENT: 'subscribed: what the encoders read, the newest',
         CONTROLLER_STATE: 'subscribed: whether the controller follows, the newest',
+        '~/trajectory': 'subscribed: trajectory_msgs/JointTrajectory to follow from a hover',
         '~/lift_off': 'std_srvs/Trigger: start from rest',
         '~/land': 'std_srvs/Trigger: land from wherever the platen is',
     }
@@ -96,7 +101,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         self._graph.claim(REFERENCE, 'reference')
         self._run = ReferenceRun(self.parameters, self.parameters.lead, self.parameters.autostart)
         self._watchers = Watchers(self, self.parameters.watchers)
-        self._seen = self._reminded = time.monotonic()
+        self._seen = self._reminded = self._looked = time.monotonic()
         self._message = Reference()
         self._message.header.frame_id = 'stage'
         self._publisher = self.create_publisher(Reference, REFERENCE, reference_qos())
@@ -105,6 +110,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         self._lockstep = self.parameters.mode == 'lockstep'
         self._measured: Measurement | None = None
         self._published = 0.0  # when, last
+        self.create_subscription(JointTrajectory, '~/trajectory', self._on_trajectory, 1)
         self.create_service(Trigger, '~/lift_off', self._lift_off)
         self.create_service(Trigger, '~/land', self._land)
         self.create_timer(self.parameters.poll_period, self._poll, clock=self.steady_clock)
@@ -121,6 +127,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
             self._watch()
         if self._run.started:
             self._give_way()
+            self._consider()
             self._publish()
             self._follow_phase()
 
@@ -142,10 +149,23 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
     def _wait(self, news: bool) -> None:
         # In real time nobody waits for the controller but us; in lockstep it waits for us.
         answered = self._lockstep or self._run.controller is not None
-        if news and answered and not self._watchers.missing(REFERENCE):
+        if news and self._flown:
+            self._leave_if_another()
+        if news and answered and not self._flown and not self._watchers.missing(REFERENCE):
             self._start()
         else:
             self._remind()
+
+    @property
+    def _flown(self) -> bool:
+        """Whether currents flow: the platen comes down, or somebody flies it already."""
+        return self._measured is not None and self._measured.controller != NOBODY
+
+    def _leave_if_another(self) -> None:
+        """End when the graph shows who flies the stage; on a busy machine that takes its time."""
+        if time.monotonic() - self._looked > _LOOK_PERIOD:
+            self._looked = time.monotonic()
+            self._graph.alone()
 
     def _remind(self) -> None:
         if time.monotonic() - self._reminded > _REMINDER:
@@ -159,6 +179,8 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
             return f'waiting for {", ".join(missing)} to subscribe to {where}'
         if self._measurements.publisher_count() == 0:
             return f'waiting for a stage on {self._measurements.topic}'
+        if self._flown:
+            return 'waiting for the stage to come to rest'
         return f'waiting for a controller on {self._states.topic}'
 
     def _position(self) -> FloatArray:
@@ -261,6 +283,24 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
             who = 'the stage is gone'
         self.fail(f'no measurement for {silent:.1f} s after sample {self._run.newest}: {who}')
 
+    def _on_trajectory(self, message: JointTrajectory) -> None:
+        """Take a trajectory in; it is checked in pieces, between which the hover goes on."""
+        try:
+            if message.header.stamp.sec or message.header.stamp.nanosec:
+                raise UnreachableError('header.stamp must be 0: it starts at once')
+            self._run.propose(message.joint_names, [_point(each) for each in message.points])
+        except UnreachableError as error:
+            self.get_logger().error(f'trajectory refused: {error}')
+
+    def _consider(self) -> None:
+        try:
+            length = self._run.consider()
+        except UnreachableError as error:
+            self.get_logger().error(f'trajectory refused: {error}')
+            return
+        if length is not None:
+            self.get_logger().info(f'following a trajectory of {length:g} s, then hovering')
+
     def _lift_off(self, _request: Any, response: Any) -> Any:
         until = time.monotonic() + _NEWS_TIME
         while self._run.obstacle()[0] and time.monotonic() < until:
@@ -302,6 +342,11 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         if self._run.left:
             return DiagnosticStatus.WARN, f'left the run: {self._run.left}', facts
         return DiagnosticStatus.OK, 'running', facts
+
+
+def _point(given: Any) -> Point:
+    time = given.time_from_start.sec + 1e-9 * given.time_from_start.nanosec
+    return Point(time, given.positions, given.velocities, given.accelerations)
 
 
 def main() -> None:

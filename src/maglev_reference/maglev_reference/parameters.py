@@ -92,6 +92,20 @@ class ReferenceLimits:
         unit='A',
         within=(0.1, 100.0),
     )
+    voltage: float = parameter(
+        0.0, 'of a phase that a fastest move takes at most; 0: any', unit='V', within=(0.0, 1e4)
+    )
+    resistance: float = parameter(4.0, 'of a phase', unit='ohm', within=(0.0, 1e3))
+    inductance: float = parameter(
+        45e-3, 'of a phase where the gap is gap_max', unit='H', within=(1e-4, 10.0)
+    )
+    smoothing: float = parameter(
+        0.01,
+        'time over which the acceleration of a fastest move turns; longer where the voltage '
+        'needs it',
+        unit='s',
+        within=(0.001, 1.0),
+    )
 
     def __post_init__(self) -> None:
         for axis, lower, upper in zip(AXES, self.lower, self.upper, strict=True):

@@ -7,9 +7,15 @@ leaves its run when the controller does not follow, or lands by itself. After th
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import numpy as np
+
 from maglev_model.axes import FloatArray
 from maglev_model.modes import Mode
 from maglev_model.phases import Phase
+from maglev_reference.check import UnreachableError
+from maglev_reference.given_points import Candidate, Point, Through
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.timeline import Block, Timeline
 
@@ -44,6 +50,7 @@ class ReferenceRun:
         self._timeline: Timeline | None = None
         self._origin = 0  # the stage's sample that is the timeline's first
         self._next = 0  # the timeline's first sample that is not published
+        self._candidate: Candidate | None = None
 
     @property
     def started(self) -> bool:
@@ -168,6 +175,43 @@ class ReferenceRun:
             return False
         self.left = ''
         return True
+
+    def propose(self, names: Sequence[str], points: Sequence[Point]) -> None:
+        """Take a trajectory in, to be followed from the hover once :meth:`consider` has checked it.
+
+        Raises UnreachableError where it makes no motion, and while the platen does not hover.
+        """
+        self._candidate = Candidate(
+            Through(names, points, self._hover()), self._hover(), self._parameters
+        )
+
+    def consider(self) -> float | None:
+        """Check some more of what was proposed; its length [s] when it is followed from now on.
+
+        Raises UnreachableError, and forgets it, where it cannot be followed.
+        """
+        candidate, self._candidate = self._candidate, None
+        if candidate is None:
+            return None
+        done = candidate.check()
+        hover = self._hover()
+        if not np.array_equal(hover, candidate.hover):
+            raise UnreachableError('the reference does not hover any more where it did')
+        if not done:
+            self._candidate = candidate
+            return None
+        assert self._timeline is not None
+        self._timeline.follow(self._next, candidate.motion, candidate.samples)
+        return candidate.motion.length
+
+    def _hover(self) -> FloatArray:
+        if self._timeline is None:
+            raise UnreachableError('there is no stage')
+        reason, _ = self.obstacle()
+        hover = self._timeline.hover(self._next)
+        if reason or hover is None:
+            raise UnreachableError(reason or 'the reference does not hover')
+        return hover
 
     def land(self) -> bool:
         """Land with what is published next; false when it has landed already, or is about to."""

@@ -134,6 +134,12 @@ class Planner:
         """END for ever where the platen is."""
         self._append(Phase.END, Stand(self._state.position), None, self._state.position)
 
+    def follow(self, motion: Motion, samples: int) -> None:
+        """TRACK along a motion that ends at rest, then HOLD for ever where it ends."""
+        end = state_at(motion, samples * self._parameters.sample_time)
+        self._append(Phase.TRACK, motion, samples, end.position)
+        self._append(Phase.HOLD, Stand(end.position), None, end.position)
+
     def rest(self) -> None:
         """REST for ever where the platen is."""
         self._append(Phase.REST, Stand(self._state.position), None, self._state.position)

@@ -18,13 +18,15 @@ from maglev_model.axes import FloatArray, Y
 from maglev_model.phases import Phase
 from maglev_reference.check import UnreachableError, check_locked, check_rest, check_samples
 from maglev_reference.currents import check_currents
-from maglev_reference.motion import Kinematics, State, state_at
+from maglev_reference.motion import Kinematics, Motion, State, state_at
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.segments import Planner, Segment
 
 _CHUNK = 256  # samples evaluated together, so that a value does not depend on who asks for how many
 _CHECKED_TOGETHER = 65536
 _MEASURED = (Phase.TRACK, Phase.STEP)
+_GROUND = (Phase.REST, Phase.END)
+_IN_FLIGHT = (Phase.HOLD, *_MEASURED)
 
 
 class Block(NamedTuple):
@@ -122,7 +124,25 @@ class Timeline:
 
     def settled(self, sample: int) -> bool:
         """Whether it rests from ``sample`` on, until it is told to lift off."""
-        return self._segments[self._index(sample)].samples is None
+        segment = self._segments[self._index(sample)]
+        return segment.samples is None and segment.phase in _GROUND
+
+    def hover(self, sample: int) -> FloatArray | None:
+        """Where it hovers at ``sample`` (5,) [m, rad]; None where it moves, or does not fly."""
+        state = self._state_before(sample)
+        flies = self.phase(sample) in _IN_FLIGHT
+        still = not (state.velocity.any() or state.acceleration.any())
+        return state.position if flies and still else None
+
+    def follow(self, first: int, motion: Motion, samples: int) -> None:
+        """From sample ``first`` on, follow a motion from the hover there, and hover where it ends.
+
+        Until it is told to land. What is followed has been checked.
+        """
+        segment = self._segments[self._index(first)]
+        planner = Planner(self._parameters, first, segment.number + 1, self._state_before(first))
+        planner.follow(motion, samples)
+        self._replace(first, planner.segments)
 
     def lift_off(self, first: int, rest: FloatArray) -> bool:
         """Start at sample ``first`` from rest at ``rest`` (5,), the first time or after a landing.
@@ -131,7 +151,7 @@ class Timeline:
         lift off from there; it then goes on resting.
         """
         segment = self._segments[self._index(first)]
-        if segment.samples is not None:
+        if not self.settled(first):
             return False
         start = State.at_rest(self._rest_position(rest))
         planner = self._full_plan(start, first, segment.number + 1)

@@ -12,6 +12,7 @@ from maglev_model.plugins import find_plugin
 from maglev_model.quintic import minimum_jerk_time
 from maglev_reference.check import UnreachableError
 from maglev_reference.curves import Chirp, Helix, Sinusoids, Square
+from maglev_reference.fastest import Fastest, FastestMoves
 from maglev_reference.motion import Kinematics, Motion, Quintic, Stand, State
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.waypoints import Waypoints
@@ -73,6 +74,8 @@ def course(parameters: ReferenceParameters) -> Course:
         case 'square':
             square = Square(parameters.square, home)
             return Course(square, period=square.period)
+        case 'waypoints' if parameters.waypoints.profile == 'fastest':
+            return _passing(FastestMoves(parameters))
         case 'waypoints':
             return _passing(Waypoints(parameters.waypoints, parameters.sample_time))
         case 'file':
@@ -145,7 +148,9 @@ def steps(parameters: ReferenceParameters) -> list[Step]:
         before, after = home.copy(), home.copy()
         before[index], after[index] = start, target
         motion: Motion = Stand(after)
-        if table.shaped:
+        if table.shaped and table.profile == 'fastest':
+            motion = Fastest(before, after, parameters)
+        elif table.shaped:
             least = minimum_jerk_time(target - start, math.inf, table.acceleration[index])
             duration = max(table.shaping_time, least)
             motion = Quintic(State.at_rest(before), State.at_rest(after), duration)

@@ -10,6 +10,8 @@ from maglev_model.axes import AXES
 from maglev_model.loop_parameters import REFERENCE_FREQUENCY
 from maglev_model.parameters import ParameterError, group, parameter
 
+PROFILES = ('minimum_jerk', 'fastest')
+
 
 def same_length(where: str, names: Sequence[str], lengths: Sequence[int]) -> None:
     """Refuse arrays of one group that are not of one length, at least 1."""
@@ -93,7 +95,12 @@ class StepParameters:
         (0.027,), 'where each step ends', unit='m, rad', within=(-0.05, 0.05)
     )
     settle: float = parameter(2.0, 'rest before each step', unit='s', within=(0.0, 60.0))
-    shaped: bool = parameter(True, 'minimum-jerk steps; false: the reference jumps')
+    shaped: bool = parameter(True, 'steps by their profile; false: the reference jumps')
+    profile: str = parameter(
+        'minimum_jerk',
+        'of a shaped step: minimum jerk, or the fastest within limits.*',
+        choices=PROFILES,
+    )
     shaping_time: float = parameter(
         0.2, 'least time of a shaped step', unit='s', within=(0.01, 10.0)
     )
@@ -203,6 +210,11 @@ class WaypointParameters:
         unit='m/s^2, rad/s^2',
         within=(1e-3, 100.0),
         length=5,
+    )
+    profile: str = parameter(
+        'minimum_jerk',
+        'of a move: minimum jerk within velocity and acceleration, or the fastest within limits.*',
+        choices=PROFILES,
     )
     dwell: float = parameter(0.5, 'rest at each point', unit='s', within=(0.0, 600.0))
     repeat: bool = parameter(False, 'back to the first point and again; false: stay at the last')

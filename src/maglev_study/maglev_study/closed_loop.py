@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maglev_controller.control_arrays import ControlArrays, Currents, Reading, Reference
+from maglev_controller.learning import IterativeLearning
+from maglev_controller.learning_step import NO_LEARNING, LearningArrays, learn, look_ahead
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import MeasurementFault, Regulator
 from maglev_controller.sample_step import FIRST_FAULT, control_step
@@ -68,6 +70,14 @@ class Run:
         return _outputs(self.own_length, self.radius)
 
 
+def _following(
+    learning: IterativeLearning | None, follows: NDArray[np.bool_] | None, n: int
+) -> NDArray[np.bool_]:
+    if learning is None:
+        return np.zeros(0, dtype=np.bool_)
+    return np.ones(n, dtype=np.bool_) if follows is None else follows
+
+
 def _outputs(length: FloatArray, radius: float) -> FloatArray:
     return outputs_of_gaps(length[:, :4], length[:, 4], length[:, 5], radius)
 
@@ -85,16 +95,20 @@ def _loop(
     current: FloatArray,
     code: NDArray[np.int8],
     delayed: bool,
+    learning: LearningArrays,
+    follows: NDArray[np.bool_],
 ) -> int:
     """All samples, or up to the first that the regulator refuses; returns how many went well."""
     stage: StageArrays = block[0]
-    answer = np.zeros(8)
+    answer, learns = np.zeros(8), follows.size > 0
     for k in range(position.shape[0]):
         state[k] = stage.state
         encode(block)
         reading[k] = stage.reading
         if stage.effects.sensor.on:
             own[k] = stage.effects.sensor.own
+        if learns:
+            look_ahead(learning, control, follows[k])
         code[k] = control_step(
             control,
             Reading(stage.reading[:4], stage.reading[4], stage.reading[5]),
@@ -103,6 +117,8 @@ def _loop(
         )
         if code[k] >= FIRST_FAULT:
             return k
+        if learns:
+            learn(learning, control)
         if delayed:
             advance(block)
         for i in range(8):
@@ -154,11 +170,14 @@ def run(
     references: References,
     *,
     delayed: bool = False,
+    learning: IterativeLearning | None = None,
+    follows: NDArray[np.bool_] | None = None,
 ) -> Run:
     """Carry the stage along a reference, from the sample it stands at; both keep their states.
 
     With ``delayed`` the currents take effect one sample late, as in real time. Otherwise this is
     bit for bit what :meth:`Regulator.step` and the stage's ``read`` and ``write`` give in turn.
+    ``learning`` learns at the samples that ``follows`` (n,) tells, by default all.
     Raises ValueError for references of another shape than (n, 5), and, naming the sample,
     :class:`MeasurementFault` when the regulator refuses one, :class:`LawFault` when a law of
     somebody else's fails: what nodes land upon.
@@ -186,6 +205,8 @@ def run(
             rows.current,
             rows.code,
             delayed,
+            NO_LEARNING if learning is None else learning.arrays,
+            _following(learning, follows, n),
         )
         if done < n:
             gap, x, z = arrays.reading[:4], float(arrays.reading[4]), float(arrays.reading[5])

@@ -15,6 +15,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from maglev_controller.foreign_law import Law
+from maglev_controller.learning import IterativeLearning, iterative_learning
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
 from maglev_model.axes import AXES, FloatArray
@@ -50,13 +52,15 @@ class FlightRecord:
     """What happened in the n samples of a flight; row k is sample k.
 
     ``time`` (n,) [s]; ``phase`` (n,) of :class:`maglev_model.phases.Phase`; ``reference`` what was
-    to be followed, (n, 5) each; ``run`` the true states and the currents.
+    to be followed, (n, 5) each; ``run`` the true states and the currents; ``learning`` what was
+    learned, where ``learning.period`` of the controller asks for it.
     """
 
     time: FloatArray
     phase: NDArray[np.uint8]
     reference: References
     run: Run
+    learning: IterativeLearning | None = None
 
     @property
     def output(self) -> FloatArray:
@@ -88,6 +92,7 @@ def fly(
     plant: PlantParameters | Mapping[str, object] | None = None,
     controller: ControllerParameters | Mapping[str, object] | None = None,
     reference: Mapping[str, object] | None = None,
+    law: Law | None = None,
 ) -> FlightRecord:
     """Lift off, follow a trajectory, land: simulated stage, regulator and reference in lockstep.
 
@@ -95,7 +100,8 @@ def fly(
     the time that is measured. All parameters have the nodes' defaults, the benchmark plant among
     them. ``files`` are parameter files as the nodes take them, the later winning; what is given
     here by name wins over them, ``plant={'encoder.gap_noise': 1e-6}``; a whole table is taken as it
-    is, and ``files`` do not change it.
+    is, and ``files`` do not change it. ``law``, an object as in docs/extending.md, answers in place
+    of the controller's own.
 
     Raises ParameterError naming what is wrong with a parameter or out of the reference's reach, and
     MeasurementFault when the regulator gives the platen up, LawFault when a law of your own fails.
@@ -118,9 +124,16 @@ def fly(
     assert timeline.end is not None
     block = timeline.block(0, timeline.end + 1)
     references = References(block.position, block.velocity, block.acceleration)
-    outcome = run(Regulator(control_table), SimulatedStage(stage_table), references)
+    learning = iterative_learning(control_table)
+    outcome = run(
+        Regulator(control_table, law),
+        SimulatedStage(stage_table),
+        references,
+        learning=learning,
+        follows=block.phase == Phase.TRACK,
+    )
     time = course.sample_time * np.arange(block.phase.size, dtype=np.float64)
-    return FlightRecord(time, block.phase, references, outcome)
+    return FlightRecord(time, block.phase, references, outcome, learning)
 
 
 def _table(

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maglev_controller.control_arrays import EXACT, INVERSES, SIMPLIFIED
 from maglev_controller.design.axis_design import AxisDesign, feedback_system
 from maglev_controller.design.notch import notch_system
 from maglev_controller.design.state_space import discretise
@@ -20,15 +19,7 @@ from maglev_controller.laws import control_law
 from maglev_controller.parameters import ControllerParameters
 from maglev_model.axes import AXES, FloatArray
 from maglev_model.compiled import compiled
-from maglev_model.equilibrium import equilibrium_inverse
-from maglev_model.inverse import (
-    NO_LIMITS,
-    Answer,
-    exact_currents,
-    exact_inverse,
-    simplified_inverse,
-)
-from maglev_model.machine import machine_constants
+from maglev_model.inverse import NO_LIMITS, exact_currents
 from maglev_model.machine_array import machine_from_array
 from maglev_model.optional import needed
 from maglev_model.parameters import ParameterError
@@ -37,6 +28,7 @@ from maglev_plant.arrays import StageArrays, stage_arrays, true_machine
 from maglev_plant.dynamics import derivative
 from maglev_plant.parameters import PlantParameters
 from maglev_study.arguments import a_table, positions
+from maglev_study.inverses import inverse_of
 from maglev_study.references import HOVER
 
 if TYPE_CHECKING:
@@ -247,20 +239,8 @@ def _inverse_slopes(
     stage: _Stage, controller: ControllerParameters, index: int
 ) -> tuple[float, float]:
     """What the inverse's currents make of the axis: acceleration by position [1/s²], and by w."""
-    machine, inverse = machine_constants(controller.machine), INVERSES.index(controller.inverse)
-    controlled = np.array([float(axis.controlled) for axis in controller.axes])
-    equilibrium = controller.compensator.equilibrium
-
-    def currents(output: FloatArray, wanted: FloatArray) -> FloatArray:
-        found = np.zeros(8)
-        answer = Answer(found[:4], found[4:], np.empty(5), np.empty(2))
-        if inverse == EXACT:
-            exact_inverse(machine, NO_LIMITS, controlled, output, wanted, answer)
-        elif inverse == SIMPLIFIED:
-            simplified_inverse(machine, NO_LIMITS, controlled, output, wanted, answer)
-        else:
-            equilibrium_inverse(machine, NO_LIMITS, controlled, equilibrium, wanted, answer)
-        return found
+    currents = inverse_of(controller, NO_LIMITS)
+    controlled = [axis.controlled for axis in controller.axes]
 
     def made(wanted: FloatArray) -> FloatArray:
         return stage.rates(0.0, stage.state, currents(stage.position, wanted))[1::2]

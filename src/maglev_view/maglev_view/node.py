@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -20,6 +19,7 @@ from visualization_msgs.msg import MarkerArray
 
 from maglev_model.axes import FloatArray
 from maglev_model.geometry import outputs_of_gaps
+from maglev_node.dds import share_no_memory
 from maglev_node.graph_guard import GraphGuard
 from maglev_node.node import MaglevNode, NodeParameters
 from maglev_node.polling import PolledSubscription
@@ -56,7 +56,6 @@ NEEDS: dict[str, tuple[type, tuple[str, ...]]] = {
 
 _LOOK_PERIOD = 0.5  # between two looks at who subscribes, wall clock [s]
 _POLL_PERIOD = 0.005  # between two looks at what has come, wall clock [s]
-_NICENESS = 10
 
 _NEWEST = QoSProfile(
     history=HistoryPolicy.KEEP_LAST,
@@ -205,7 +204,7 @@ class ViewNode(MaglevNode[ViewNodeParameters]):
 
 def main() -> None:
     """Entry point of the executable."""
-    os.nice(_NICENESS)
+    share_no_memory()
     run_main(ViewNode, 'view', background=True)
 
 

@@ -15,8 +15,11 @@ from maglev_hw_bridge.drivers.quanser import QuanserDriver
 from maglev_hw_bridge.guard import Guard
 from maglev_hw_bridge.landing import Landing
 from maglev_hw_bridge.stage import BridgeStage
-from maglev_study.faults.judge import Verdict
+from maglev_study.faults.flight import Flight
+from maglev_study.faults.judge import Judge, Verdict
 from maglev_study.faults.kinds import Fault
+from maglev_study.faults.machines import machine
+from maglev_study.faults.programme import programme
 
 Flown = Callable[..., Verdict]
 KILLED = Fault('controller: killed')
@@ -49,6 +52,46 @@ def test_1_what_is_not_found_out(flown: Flown, monkeypatch: pytest.MonkeyPatch) 
 
     monkeypatch.setattr(Guard, 'watch', blind)
     assert 1 in broken(flown(Fault('stuck: x or z', (4,)), 'ellipse', 0.5))
+
+
+HIDDEN = Fault('stuck: x or z', (4,)), 'hover', 0.97  # while it stands still
+
+
+def test_1_what_is_hidden_is_due_when_forces_tell(flown: Flown) -> None:
+    verdict = flown(*HIDDEN)
+    assert verdict.violations == ()
+    assert 'encoder x is stuck' in verdict.reason
+
+
+def test_1_what_is_hidden_and_never_found_out(
+    flown: Flown, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(BridgeStage, '_sensing_fault', lambda *_: None)
+    violations = dict(flown(*HIDDEN).violations)
+    assert 'never found out' in violations[1]
+
+
+@pytest.mark.parametrize(('others', 'hidden'), [(4e-5, True), (6e-5, False)])
+def test_1_a_stuck_encoder_is_hidden_while_all_others_stand_still(
+    others: float, hidden: bool
+) -> None:
+    judge = Judge(Flight(machine(0), programme(0)))
+    judge._n = 100
+    judge._state[:100, 0] = 0.025
+    judge._shift[50:100, 5] = np.arange(50)
+    judge._state[90, 2] = others
+    assert judge._is_hidden((5,), 99) == hidden
+    assert not judge._is_hidden((), 99)
+    assert not judge._is_hidden(tuple(range(6)), 99)
+    judge._state[90, 2], judge._state[40, 2] = 0.0, others  # before it was stuck
+    assert judge._is_hidden((5,), 99)
+
+
+def test_1_homing_finds_out_when_the_fault_is_latched(flown: Flown) -> None:
+    verdict = flown(Fault('stuck: a gap', (3,)), 'homing', 0.2)
+    assert verdict.violations == ()
+    assert verdict.detection is not None
+    assert verdict.detection < 0.01
 
 
 def test_2_a_landing_that_is_cut(flown: Flown, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -70,6 +70,15 @@ def test_a_run_is_the_same_by_its_seed_and_from_a_file(
     assert 'What happened' in page
 
 
+def test_a_run_that_hangs_has_a_page_too(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr('maglev_study.faults.train._PATIENCE', 0.0)
+    assert main(['--replay', '50', '--out', str(tmp_path)]) == BROKEN
+    assert 'the run hangs' in capsys.readouterr().out
+    assert 'the run hangs' in (tmp_path / 'run-50.html').read_text(encoding='utf-8')
+
+
 def test_it_leaves_a_page_and_says_by_its_code_whether_rules_were_broken(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -10,13 +10,10 @@ from itertools import groupby
 from multiprocessing.synchronize import Event
 from typing import NamedTuple, TypeVar
 
-from maglev_study.faults.flight import Flight
 from maglev_study.faults.fly import Scenario
 from maglev_study.faults.judge import Verdict
-from maglev_study.faults.machines import NOMINAL, machine
-from maglev_study.faults.programme import programme
 from maglev_study.faults.shrink import shrink
-from maglev_study.faults.train import fly_all
+from maglev_study.faults.train import fly_all, warm_up
 
 _stop: Event | None = None
 
@@ -43,7 +40,7 @@ class Campaign:
     def __enter__(self) -> Campaign:
         context = multiprocessing.get_context('fork')
         self._stop = context.Event()
-        Flight(machine(NOMINAL), programme(NOMINAL))  # compiled once, before there are processes
+        warm_up()
         self._pool = ProcessPoolExecutor(self._jobs, context, _begin, (self._stop,))
         return self
 

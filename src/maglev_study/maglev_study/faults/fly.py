@@ -135,7 +135,7 @@ class Course:
         """One sample."""
         self.flight.step()
         self.note()
-        self.judge.after_step()
+        self.judge.look()
         if self.judge.seen is not None and self.judge.prior is None:
             self.flight.controller.heeded = False
 
@@ -261,7 +261,7 @@ def expected_of(faults: tuple[Fault, ...]) -> Expected:
     impacts = [one.impact for one in each if one.impact is not CUT]
     impact = max(impacts) if len(impacts) == len(each) and sensing < len(each) else CUT
     blame = '|'.join(one.blame for one in each) if all(one.blame for one in each) else ''
-    return Expected(impact, None, blame)
+    return Expected(impact, None, blame, stuck=tuple(i for one in each for i in one.stuck))
 
 
 _SENSING = ('stuck', 'slip', 'jump', 'noise', 'reset')

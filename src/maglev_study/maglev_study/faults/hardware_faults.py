@@ -61,7 +61,8 @@ def encoders(name: str, which: str) -> Kind:
         hopeless = lasting and gaps > _DISPENSABLE
         one = f'(?:{"|".join(ENCODER_NAMES[target] for target in fault.targets)})'
         blame = f'encoder {one}(?:, {one})* (?:jumped|is stuck|reads)|contradict'
-        return Expected(CUT if hopeless else DEGRADED, 10, blame)
+        stuck = fault.targets if name == 'stuck' else ()
+        return Expected(CUT if hopeless else DEGRADED, 10, blame, stuck=stuck)
 
     lost_unseen = name in ('slip', 'jump', 'reset') and which != 'gap'
     phases = tuple(phase for phase in PHASES if not (lost_unseen and phase == 'arming'))

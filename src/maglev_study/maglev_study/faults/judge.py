@@ -9,6 +9,7 @@ import re
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from maglev_hw_bridge.rig import Rig
 from maglev_model.axes import FloatArray
@@ -30,6 +31,9 @@ QUIET_AFTER = 25  # samples from a terminal state to when there is no output
 _QUIET = 1e-6  # [V]
 _FLYING = 1e-4  # above the lower stop [m]
 _OFF_COURSE = (1.5e-3, 3e-3, 3e-3)  # of y, x, z while nothing is found out [m]
+_STILL = 5e-5  # what the others count at most while a fault is hidden [m]
+_HIDDEN = np.array([200, 200, 200, 200, 500, 500])
+"""Counts a stuck encoder is off the truth by when forces alone must have told of it."""
 _FALL = 600  # longest, without current [samples]
 _CUT_SAMPLES = 3
 _WATCHDOG = 20  # [samples]
@@ -79,6 +83,7 @@ class Judge:
     # -- while it flies ----------------------------------------------------------------------------
 
     def _observe(self) -> None:
+        self.look()  # homing takes many samples
         world, n = self.flight.world, self._n
         if n >= _LONGEST:
             raise RuntimeError('the run does not end')
@@ -92,7 +97,7 @@ class Judge:
         self._enabled_before = enabled
         self._n = n + 1
 
-    def after_step(self) -> None:
+    def look(self) -> None:
         """Look at the fault, once a sample."""
         fault = self.flight.bridge.stage.fault
         if self.prior is not None and fault is self.prior:
@@ -153,8 +158,15 @@ class Judge:
         """The verdict; ``shows`` are samples of the log at which something could be seen."""
         n = self._n
         first = self._first_sign(shows)
+        hidden = self._is_hidden(expected.stuck, first)
+        if hidden:
+            first = self._first_sign([], _HIDDEN)
+            gaps = sum(encoder < 4 for encoder in expected.stuck)
+            expected = expected._replace(impact=CUT if gaps > 1 else expected.impact)
         impact = max(self.flight.world.rig.impact, self._across())
         self._judge_detection(expected, first)
+        if not hidden:
+            self._judge_course()
         self._judge_impact(expected, impact)
         self._judge_outputs()
         if self.reason and expected.blame and not re.search(expected.blame, self.reason):
@@ -170,19 +182,42 @@ class Judge:
         return bool(self._state[min(index, self._n - 1), 0] < self._floor - _FLYING)
 
     @property
+    def _end(self) -> int:
+        return self._n if self.ended is None else self.ended
+
+    @property
     def _floor(self) -> float:
         return self.flight.parameters.machine.gap_max
 
-    def _first_sign(self, shows: list[int]) -> int | None:
-        wrong = np.any(np.abs(self._shift[: self._n] - self.baseline) > SHOWS, axis=1)
+    def _first_sign(self, shows: list[int], most: NDArray[np.int64] = SHOWS) -> int | None:
+        wrong = np.any(np.abs(self._shift[: self._n] - self.baseline) > most, axis=1)
         signs = [int(np.argmax(wrong))] if wrong.any() else []
         return min([*shows, *signs], default=None)
+
+    def _is_hidden(self, stuck: tuple[int, ...], first: int | None) -> bool:
+        """Whether all other encoders stood still as well from when some stuck until it showed.
+
+        Then the platen moves only where nothing is left to see it: it could as well be held by
+        friction, or by a stop, as by the model alone nobody can tell within what it is off.
+        """
+        if not stuck or first is None:
+            return False
+        off = np.abs(self._shift[: first + 1] - self.baseline)[:, stuck].max(axis=1)
+        begun = max(int(np.argmax(off > 0)) - 1, 0)
+        others = [encoder for encoder in range(6) if encoder not in stuck]
+        moved = np.ptp(self._lengths(slice(begun, first + 1))[:, others], axis=0)
+        return bool(others) and bool(np.all(moved <= _STILL))
+
+    def _lengths(self, where: slice) -> FloatArray:
+        """What the six encoders should read at samples of the log [m], (n, 6)."""
+        y, x, z, phi, theta = self._state[where, :10:2].T
+        r = self.flight.parameters.machine.radius
+        return np.stack([y - r * phi, y + r * theta, y + r * phi, y - r * theta, x, z], axis=1)
 
     def _judge_detection(self, expected: Expected, first: int | None) -> None:
         if first is not None:
             first = max(first, self.latched)
-        until = self._n if self.ended is None else self.ended
-        seen = self.seen if self.seen is not None else until
+        seen = self._end if self.seen is None else self.seen
         wanted = first is not None and expected.seen is not None
         if wanted and expected.aloft and not self._aloft(first or 0):
             wanted = False
@@ -190,10 +225,14 @@ class Judge:
         if late and first is not None:
             what = 'never found out' if self.seen is None else 'found out late'
             self.blame(1, f'{what}: {seen - first} samples after it showed')
+
+    def _judge_course(self) -> None:
+        """What is not found out must not carry the platen away."""
+        seen = self._end if self.seen is None else self.seen
         error = np.abs(self._state[:seen, :5:2] - self._course[:seen])
         with np.errstate(invalid='ignore'):
             astray = np.any(error > _OFF_COURSE, axis=1)
-        if astray.any() and not late:
+        if astray.any():
             at = int(np.argmax(astray))
             if self.seen is None or self.seen > at + QUIET_AFTER:
                 worst = 1e3 * np.nanmax(error[: seen + 1], axis=0)
@@ -208,8 +247,7 @@ class Judge:
         if told:
             foretold = float(told.group(1))
         else:
-            over = self._n if self.ended is None else self.ended
-            at = min(over if self.seen is None else self.seen, self._n - 1)
+            at = min(self._end if self.seen is None else self.seen, self._n - 1)
             expired = min(at + _WATCHDOG, self._n - 1)  # by then a watchdog has cut
             foretold = max(self._fall_from(max(at - 1, 0)), self._fall_from(expired))
         most = max(DEGRADED, 1.15 * foretold + 0.03)

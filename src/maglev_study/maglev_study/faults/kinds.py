@@ -39,6 +39,7 @@ class Expected(NamedTuple):
     seen: int | None  # samples from when it shows to when it is latched; None: need not be
     blame: str  # what the reason must match, or ''
     aloft: bool = False  # seen only where the platen flies when it shows
+    stuck: tuple[int, ...] = ()  # encoders that stand still from then on
 
 
 Begin = Callable[['Run', Fault], None]

@@ -34,8 +34,9 @@ def replay(run: Scenario) -> Record:
     """Fly one run and keep its log."""
     ((_, outcome),) = fly_all([run], work=_record)
     if isinstance(outcome, Verdict):  # it hung, or died
-        nothing = np.zeros((1, 16))
-        return Record(run, outcome, nothing, nothing, nothing, nothing, {})
+        return Record(
+            run, outcome, np.zeros((0, 10)), np.zeros((0, 16)), np.zeros((0, 6)), np.zeros(0), {}
+        )
     return outcome
 
 

@@ -6,6 +6,7 @@ the others: it may hang, or die.
 
 from __future__ import annotations
 
+import functools
 import gc
 import os
 import pickle
@@ -13,18 +14,28 @@ import select
 import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
 from typing import TypeVar
 
 from maglev_study.faults.flight import Flight
 from maglev_study.faults.fly import Scenario, fly
 from maglev_study.faults.judge import Verdict
-from maglev_study.faults.machines import machine
-from maglev_study.faults.programme import programme
+from maglev_study.faults.kinds import Fault
+from maglev_study.faults.machines import NOMINAL, machine
+from maglev_study.faults.programme import BEFORE_THE_FIRST_SAMPLE, programme
 
 _PATIENCE = 60.0  # with a run [s]
 
 T = TypeVar('T')
+
+
+@functools.cache
+def warm_up() -> None:
+    """Compile all that a run calls, from homing to restart, before processes branch off.
+
+    Each would do it again otherwise, for longer than a run may take where nothing is cached yet.
+    """
+    flight = Flight(machine(NOMINAL), programme(NOMINAL))
+    fly(flight, Scenario(NOMINAL, BEFORE_THE_FIRST_SAMPLE[0], 0.0, (Fault('none'),), 0))
 
 
 def fly_all(
@@ -33,6 +44,7 @@ def fly_all(
     work: Callable[[Flight, Scenario], T] = fly,  # type: ignore[assignment]
 ) -> Iterator[tuple[Scenario, T | Verdict]]:
     """Fly runs of one machine in the order in which they branch off, each with its outcome."""
+    warm_up()
     flight = Flight(machine(runs[0].machine), programme(runs[0].machine))
     gc.collect()
     gc.freeze()
@@ -41,7 +53,7 @@ def fly_all(
         if stopped():
             return
         _go(flight, place)
-        yield runs[number], _branch(partial(work, flight, runs[number]))
+        yield runs[number], _branch(functools.partial(work, flight, runs[number]))
 
 
 def _place(flight: Flight, run: Scenario) -> int:

@@ -1,4 +1,4 @@
-"""Whose clicks count: those of a page that came from here. No ROS here.
+"""Whose clicks may do harm: those of a page that came from here. No ROS here.
 
 A browser lets any page of any site speak to a server on this machine. Such a page names its own
 origin, and one that has bent a name of its own to this machine names that as the host: neither

@@ -28,6 +28,11 @@ BUTTONS = {
 }
 """What an operator may ask for, with the colours of the buttons."""
 
+HARMLESS = ('Land', 'Emergency stop')
+"""What is obeyed whoever asks: a stop must not depend on the name that a page was loaded by."""
+
+_STRANGE = 'refused: this page was loaded by a name that is not one of this machine or its address'
+
 _PLOTS = {'errors in y, x, z [µm]': (0, 1, 2), 'errors in phi, theta [µrad]': (3, 4)}
 _SLOW = 5  # the plots are drawn at every so many updates
 
@@ -116,8 +121,14 @@ class Page:
 
     def _asks_for(self, wish: str) -> Callable[[Any], None]:
         def clicked(event: Any) -> None:
-            connection = self._server._websock_server._live_connections.get(event.client_id)
-            if connection is not None and trusted(connection.request.headers):
+            if wish in HARMLESS or self._knows(event.client_id):
                 self.wishes.put(wish)
+            else:
+                self.answer(_STRANGE)
 
         return clicked
+
+    def _knows(self, client: int | None) -> bool:
+        """Whether a click came from our own page."""
+        connection = self._server._websock_server._live_connections.get(client)
+        return connection is not None and trusted(connection.request.headers)

@@ -1,0 +1,39 @@
+"""A trajectory on the fly, over DDS, to real nodes: followed from a hover, or refused."""
+
+from __future__ import annotations
+
+import pytest
+from flight import WATCHED
+from graph import Nodes, Observer
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from maglev_msgs.msg import Reference
+from maglev_node.topics import REFERENCE, TRUE_STATE
+
+HOVERING = ('trajectory:=hold', 'duration:=600.0', 'run_in:=0.0', 'move_time:=0.3')
+
+
+def to_x(goal: float) -> JointTrajectory:
+    """A move of x in half a second."""
+    point = JointTrajectoryPoint(positions=[goal])
+    point.time_from_start.nanosec = 500_000_000
+    return JointTrajectory(joint_names=['x'], points=[point])
+
+
+def test_it_is_followed_from_the_hover_or_refused(nodes: Nodes, watching: Observer) -> None:
+    nodes.start('plant', WATCHED, params=('benchmark.yaml',))
+    nodes.start('controller', WATCHED)
+    reference = nodes.start('reference', WATCHED, *HOVERING)
+    reference.wait_for('TRACK at sample', timeout=180.0)
+    publisher = watching.node.create_publisher(JointTrajectory, 'reference/trajectory', 1)
+    watching.wait(lambda: publisher.get_subscription_count() == 1)
+    publisher.publish(to_x(0.06))
+    reference.wait_for('trajectory refused: unreachable reference: x is', timeout=60.0)
+    publisher.publish(to_x(0.01))
+    reference.wait_for('following a trajectory of 0.5 s, then hovering', timeout=60.0)
+    watching.wait(lambda: watching.newest(REFERENCE).phase == Reference.HOLD, timeout=60.0)
+    begun = watching.newest(TRUE_STATE).sequence
+    watching.wait(lambda: watching.newest(TRUE_STATE).sequence > begun + 500, timeout=60.0)
+    assert watching.newest(TRUE_STATE).state[2] == pytest.approx(0.01, abs=5e-5)
+    assert watching.call('/reference/land').success
+    reference.wait_for('END at sample', timeout=60.0)

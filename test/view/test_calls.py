@@ -1,0 +1,114 @@
+"""What the buttons call, in which order, and what they say of it; the services are made up."""
+
+from __future__ import annotations
+
+import time
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from maglev_node.topics import CURRENTS, MEASUREMENT, REFERENCE
+from maglev_view.web.calls import WISHES, Operator
+from maglev_view.web.page import BUTTONS
+
+NODES = {CURRENTS: 'controller', MEASUREMENT: 'plant', REFERENCE: 'reference'}
+
+
+class Service:
+    """Answers when it is told to."""
+
+    def __init__(self, name: str) -> None:
+        self.srv_name, self.calls, self.ready = name, 0, True
+        self.request: Any = None
+        self._answer: Any = None
+
+    def service_is_ready(self) -> bool:
+        return self.ready
+
+    def call_async(self, request: Any) -> Any:
+        self.calls, self.request = self.calls + 1, request
+        return SimpleNamespace(done=lambda: self._answer is not None, result=lambda: self._answer)
+
+    def answer(self, success: bool, message: str = '') -> None:
+        self._answer = SimpleNamespace(success=success, message=message)
+
+
+class Graph:
+    """Stage, controller and reference in a namespace, and an operator beside them."""
+
+    def __init__(self) -> None:
+        self.services: dict[str, Service] = {}
+        self.said: list[str] = []
+        self.operator = Operator(self, self.said.append)  # type: ignore[arg-type]
+        self.operator.look()
+
+    def get_publishers_info_by_topic(self, topic: str) -> list[Any]:
+        return [SimpleNamespace(node_namespace='/lab', node_name=NODES[topic])]
+
+    def create_client(self, _kind: Any, name: str) -> Service:
+        return self.services.setdefault(name, Service(name))
+
+    def called(self) -> set[str]:
+        return {name for name, service in self.services.items() if service.calls}
+
+
+@pytest.fixture
+def graph() -> Graph:
+    return Graph()
+
+
+def test_every_button_has_its_services() -> None:
+    assert set(BUTTONS) == set(WISHES)
+
+
+def test_an_emergency_stop_is_the_controllers(graph: Graph) -> None:
+    graph.operator.ask('Emergency stop')
+    graph.services['/lab/controller/emergency_stop'].answer(True, 'landing')
+    graph.operator.go_on()
+    assert graph.called() == {'/lab/controller/emergency_stop'}
+    assert graph.said[-1] == '/lab/controller/emergency_stop: landing'
+
+
+@pytest.mark.parametrize('how', ['silent', 'refused', 'gone'])
+def test_where_the_controller_does_not_stop_the_stage_does(
+    graph: Graph, how: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    controller = graph.services['/lab/controller/emergency_stop']
+    controller.ready = how != 'gone'
+    graph.operator.ask('Emergency stop')
+    if how == 'refused':
+        controller.answer(False, 'it flies nothing')
+    elif how == 'silent':
+        graph.operator.go_on()
+        assert '/lab/plant/emergency_stop' not in graph.called()
+        now = time.monotonic()
+        monkeypatch.setattr(time, 'monotonic', lambda: now + 0.6)
+    graph.operator.go_on()
+    assert '/lab/plant/emergency_stop' in graph.called()
+    graph.services['/lab/plant/emergency_stop'].answer(True, 'currents cut')
+    graph.operator.go_on()
+    assert graph.said[-1].endswith('/lab/plant/emergency_stop: currents cut')
+
+
+def test_a_reset_is_of_the_stage_and_then_of_the_controller(graph: Graph) -> None:
+    graph.operator.ask('Reset')
+    assert graph.called() == {'/lab/plant/reset'}
+    graph.services['/lab/plant/reset'].answer(True)
+    graph.operator.go_on()
+    graph.services['/lab/controller/reset'].answer(False, 'no fault')
+    graph.operator.go_on()
+    assert graph.said[-1] == '/lab/plant/reset: done; /lab/controller/reset: no fault'
+
+
+def test_enable_enables(graph: Graph) -> None:
+    graph.operator.ask('Enable')
+    assert graph.services['/lab/controller/enable'].request.data is True
+
+
+def test_what_nobody_offers_is_said(graph: Graph) -> None:
+    for service in graph.services.values():
+        service.ready = False
+    graph.operator.ask('Lift off')
+    graph.operator.go_on()
+    assert graph.said[-1] == f'nobody offers lift_off beside {REFERENCE}'
