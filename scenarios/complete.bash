@@ -28,4 +28,4 @@ _complete_scenario() { # SCRIPT WORD PREVIOUS
 }
 
 complete -F _complete_scenario {commission,compare,ellipse,ellipse_4dof,faults,paper_tables}.sh \
-  {single_motor,steps,trajectory}.sh
+  {robustness,single_motor,steps,trajectory}.sh

@@ -24,7 +24,7 @@ from runner.options import (
 )
 from runner.overlays import PARAMS, SECTIONS, check_overlay, overlay
 from runner.paper_tables import fly_all
-from runner.process import installed
+from runner.process import installed, program, run_to_end
 from runner.run import fly
 from runner.signals import Signals
 
@@ -78,6 +78,14 @@ happens: thousands of runs, faster than real time, without ROS; one page at the 
 a second and core.
 
 Exits with 1 when a rule is broken; each failure can be flown again by its seed."""
+ROBUSTNESS = """\
+Draws machines from the distributions in params/robustness.yaml, flies each under each law through
+the ellipse, also under forces, steps, a slow scan and a hold, without ROS, and leaves a table and a
+page: who survives what, how far errors spread, which parameter matters, which machine is worst.
+
+Called again with the same --out, it goes on where it was. --replay flies one machine through the
+whole graph, the ellipse in 4DOF."""
+HEARD_BY_ROBUSTNESS = (*HEARD_BY_COMPARE, 'robustness')
 COMMISSION = """\
 Brings a machine up step by step at low current and says what is wired or set wrongly. Without an
 overlay it runs on the emulated boards."""
@@ -263,6 +271,52 @@ def _faults(options: Sequence[str]) -> Job:
     return partial(_become, 'maglev_study', 'faults', arguments)
 
 
+def _robustness(options: Sequence[str]) -> Job:
+    name = 'robustness'
+    table = {
+        '--machines': Option('how many are drawn (default 200)', 'N', whole),
+        '--params': Option(
+            "parameters of plant, controller and distributions on top of every law's own, from\n"
+            'the current folder or from params/; repeatable, the last one wins',
+            'OVERLAY.yaml',
+            overlay,
+        ),
+        '--law': Option(
+            'files of params/laws, paper, default (default: default)', 'NAME...', several=True
+        ),
+        '--seed': Option('of the machines (default 0)', 'S', whole),
+        '--jobs': Option('processes (default: one for each core)', 'J', whole),
+        '--scheduler': Option('a Dask cluster to fly on, tcp://HOST:8786', 'ADDRESS'),
+        '--replay': Option('fly machine N through the graph; 0 is the nominal one', 'N', whole),
+        '--out': _out_option('the results are', name),
+    }
+    given = Command(f'{name}.sh', ROBUSTNESS, table).parse(options)
+    out, overlays = _out(name, given), given.get('--params', [])
+    arguments = ['--params', str(PARAMS), '--out', str(out)]
+    arguments += _as_given(given, '--machines', '--seed', '--jobs', '--scheduler', '--replay')
+    arguments += ['--law', *given['--law']] if '--law' in given else []
+    for file in overlays:
+        arguments += ['--overlay', file]
+    if '--replay' in given:
+        return partial(_replay_machine, int(given['--replay'][-1]), out, arguments, overlays)
+    return partial(_become, 'maglev_study', name, arguments, overlays, HEARD_BY_ROBUSTNESS)
+
+
+def _replay_machine(
+    number: int, out: Path, arguments: Sequence[str], overlays: Sequence[str]
+) -> int:
+    """Have the parameters of a machine written, then fly the graph with them."""
+    for path in overlays:
+        check_overlay(path, sections=HEARD_BY_ROBUSTNESS)
+    signals = Signals()
+    code = run_to_end([*program('maglev_study', 'robustness'), *arguments], signals)
+    if code or signals.code:
+        return code or signals.code
+    scenario = Scenario('ellipse_4dof', ('scenario_ellipse_4dof.yaml',))
+    files = (str(out / f'machine-{number}.yaml'),)
+    return fly(Flight(scenario, out=out, overlays=files), signals)
+
+
 def _commission(options: Sequence[str]) -> Job:
     where = 'parameters of hw_bridge, from the current folder or from params/;'
     current = 'largest current of a phase alone, 0.2 to 3 A (default 1.5)'
@@ -309,5 +363,6 @@ COMMANDS: dict[str, Callable[[Sequence[str]], Job]] = {
     'paper_tables': _paper_tables,
     'compare': _compare,
     'faults': _faults,
+    'robustness': _robustness,
     'commission': _commission,
 }

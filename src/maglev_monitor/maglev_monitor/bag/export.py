@@ -36,9 +36,10 @@ def read(path: str | Path) -> Any:
 
 
 def write(found: Table, path: Path, form: str) -> list[Path]:
-    """Write a run in one of :data:`FORMATS`; returns the files. They take their place when whole.
+    """Write a run, or another table, in one of :data:`FORMATS`; returns the files.
 
-    Raises OSError where it cannot be written, and :class:`MissingLibraryError`.
+    They take their place when whole. Raises OSError where it cannot be written, and
+    :class:`MissingLibraryError`.
     """
     partial = path.with_name(path.name + '.tmp')
     try:
@@ -65,7 +66,8 @@ def _csv(found: Table, path: Path) -> None:
     """Numbers that read back exactly, nothing where there is none."""
     with path.open('w', encoding='utf-8') as file:
         file.write(','.join(found.columns) + '\n')
-        for first in range(0, len(found.columns['sample']), _ROWS):
+        length = len(next(iter(found.columns.values())))
+        for first in range(0, length, _ROWS):
             texts = [_texts(column[first : first + _ROWS]) for column in found.columns.values()]
             file.writelines(','.join(row) + '\n' for row in zip(*texts, strict=True))
 
@@ -73,6 +75,8 @@ def _csv(found: Table, path: Path) -> None:
 def _texts(values: Any) -> list[str]:
     if values.dtype.kind == 'f':
         return ['' if value != value else repr(value) for value in values.tolist()]
+    if values.dtype.kind == 'U':
+        return ['"' + value.replace('"', '""') + '"' for value in values.tolist()]
     return [str(value) for value in values.tolist()]
 
 

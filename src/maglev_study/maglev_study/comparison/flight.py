@@ -57,20 +57,27 @@ class Flight:
         self._lower = np.array(machine.lower_limit)[free] + _AT_STOP
         self._upper = np.array(machine.upper_limit)[free] - _AT_STOP
         self.seat_radius = parameters.stop.seat_radius
+        self.lost = ''  # how the platen was, where it was
 
     def follow(self, references: References) -> Run | None:
         """Carry on along a reference; None when the platen meets a stop, or is given up."""
         try:
             outcome = run(self.regulator, self.stage, references)
-        except (MeasurementFault, LawFault):
+        except (MeasurementFault, LawFault) as fault:
+            self.lost = str(fault)
             return None
-        return None if self._met_stop(outcome.output) else outcome
+        met = np.flatnonzero(self._at_stop(outcome.output))
+        if met.size:
+            self.lost = f'sample {met[0]}: the platen meets a stop'
+            return None
+        return outcome
 
-    def _met_stop(self, output: FloatArray) -> bool:
+    def _at_stop(self, output: FloatArray) -> NDArray[np.bool_]:
         reach = self.seat_radius * np.abs(output[:, PHI:]).max(axis=1)
         free = output[:, self._free]
         seated = (output[:, Y] - reach <= self._lower[Y]) | (output[:, Y] + reach >= self._upper[Y])
-        return bool(seated.any() or np.any(free <= self._lower) or np.any(free >= self._upper))
+        beyond = (free <= self._lower) | (free >= self._upper)
+        return np.asarray(seated | beyond.any(axis=1))
 
     def approach(self, goal: FloatArray, time: float = 4.0, hold: float = 5.0) -> bool:
         """Go from 25 mm to a set-point (5,) in ``time`` [s] and hold it; false when that fails."""
@@ -85,13 +92,17 @@ class Flight:
         self.stage.arrays.block[:] = saved[0]
         self.regulator.restore(saved[1:])
 
+    def begin_step(self) -> None:
+        """What a law that is to begin every step anew does before it."""
+        if self.regulator.parameters.internal_model.restart_at_step:
+            self.regulator.reset()
+
     def step(self, begin: FloatArray, target: FloatArray, time: float, hold: float) -> Run | None:
         """A step from the set-point ``begin`` to ``target`` (5,), raw for ``time`` 0 [s].
 
         Lasts ``hold`` [s] in all; None when the platen is lost.
         """
-        if self.regulator.parameters.internal_model.restart_at_step:
-            self.regulator.reset()
+        self.begin_step()
         if time > 0.0:
             return self.follow(shaped(begin, target, time, hold - time, self.period))
         return self.follow(held(target, hold, self.period))

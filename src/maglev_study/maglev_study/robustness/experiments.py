@@ -1,0 +1,84 @@
+"""What every machine flies: the ellipse, also under forces, shaped steps, a slow scan, a hold."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Mapping
+
+import numpy as np
+
+from maglev_model.axes import AXES, PHI, THETA, FloatArray
+from maglev_study.comparison.experiments import DISTURBANCE, GROW, SHAPED_STEPS, StepExperiment
+from maglev_study.paper import TRACKING
+from maglev_study.references import HOVER, References, ellipse, shaped
+from maglev_study.rough_flights import THETA as ELLIPSE_THETA
+from maglev_study.rough_flights import experiments as rough_experiments
+
+_RUN_IN, _MEASURED = 10.0, 20.0  # of ellipses; of holds the second [s]
+_APPROACH, _REST, _STEP = 4.0, 5.0, 6.0  # to where a step begins, held there, of the step [s]
+
+
+@dataclasses.dataclass(frozen=True)
+class Experiment:
+    """A reference from rest at 25 mm, or from where ``approach`` ends.
+
+    Errors count in its last ``measured`` seconds. ``plant`` is changed in the stage, dots as
+    ``__``; ``published`` is mean |e| on the paper's machine by axis [m, rad].
+    """
+
+    name: str
+    references: References
+    measured: float
+    approach: References | None = None
+    step: StepExperiment | None = None
+    plant: Mapping[str, object] = dataclasses.field(default_factory=dict)
+    published: Mapping[str, float] = dataclasses.field(default_factory=dict)
+
+
+@functools.lru_cache(maxsize=4)
+def experiments(period: float, tilts: bool = True) -> tuple[Experiment, ...]:
+    """All of them, a sample every ``period`` [s]; without ``tilts`` none is asked for."""
+    course = ellipse(_RUN_IN + _MEASURED, ELLIPSE_THETA, period, grow=GROW)
+    rough = {one.name: one for one in rough_experiments(period, hold=_MEASURED, places=1)}
+    scan, hold = rough['scan 2 mm/s'], rough['hold 1']
+    steps = {step.axis: step for step in reversed(SHAPED_STEPS)}
+    found = [
+        Experiment('ellipse', course, _MEASURED, published=TRACKING['ellipse_4dof'].mean_error),
+        Experiment('forces', course, _MEASURED, plant=DISTURBANCE),
+        *(_step(steps[axis], period) for axis in sorted(steps)),
+        Experiment('scan', scan.references, scan.measured),
+        Experiment('hold', hold.references, hold.measured),
+    ]
+    if tilts:
+        return tuple(found)
+    return tuple(
+        dataclasses.replace(one, references=_level(one.references))
+        for one in found
+        if one.step is None or one.step.axis != THETA
+    )
+
+
+def _step(step: StepExperiment, period: float) -> Experiment:
+    start, target = (_beside(step.axis, value) for value in (step.start, step.end))
+    return Experiment(
+        f'step {AXES[step.axis]}',
+        shaped(start, target, step.time, _STEP - step.time, period),
+        _STEP,
+        approach=shaped(HOVER, start, _APPROACH, _REST, period),
+        step=step,
+    )
+
+
+def _beside(axis: int, value: float) -> FloatArray:
+    place = np.array(HOVER)
+    place[axis] = value
+    return place
+
+
+def _level(references: References) -> References:
+    """The same, with both tilts at rest."""
+    found = References(*(part.copy() for part in references))
+    for part in found:
+        part[:, PHI:] = 0.0
+    return found
