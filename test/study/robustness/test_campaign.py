@@ -180,6 +180,20 @@ def test_the_parameter_that_matters_comes_first() -> None:
     assert influence(group([1e-6] * 7), drawn) == []
 
 
+def test_an_interrupted_campaign_is_called_incomplete(
+    whole: tuple[Campaign, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for charts in (
+        'fans',
+        'distributions',
+        'tornado',
+    ):  # which take long, and are on the page below
+        monkeypatch.setattr(f'maglev_study.robustness.page.{charts}', lambda *_: [])
+    for interrupted in (False, True):
+        text = render(dataclasses.replace(whole[0], interrupted=interrupted), (), '')
+        assert ('class="badge incomplete"' in text) == interrupted
+
+
 def test_the_page_and_the_command(
     whole: tuple[Campaign, Path], tmp_path: Path, capsys: Any
 ) -> None:
@@ -210,7 +224,6 @@ def test_the_page_and_the_command(
             assert (int(row['machine']), row['experiment']) == (one.machine, one.experiment)
             assert [float(row[f'mean_{axis}']) for axis in AXES] == one.mean.tolist()
         assert float(rows[-1]['offset.mass_y']) != 1.0
-    assert 'incomplete' in render(dataclasses.replace(whole[0], interrupted=True), (), '')
 
 
 def test_a_machine_is_written_for_the_graph(plan: Plan, tmp_path: Path) -> None:
