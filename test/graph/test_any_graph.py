@@ -33,9 +33,9 @@ from maglev_node.topics import (
 )
 
 SAMPLES = 2000
-ORDERS = int(os.environ.get('MAGLEV_START_ORDERS', '2'))
+ORDERS = int(os.environ.get('MAGLEV_START_ORDERS', '1'))
 """Orders of start that are tried. More than these few are for a machine that may be busy."""
-PATIENCE = 90.0 if ORDERS == 2 else 600.0
+PATIENCE = 90.0 if ORDERS < 3 else 600.0
 """Longest wait for a flight [s]."""
 
 STRANGER = Path(__file__).resolve().parents[1] / 'support' / 'stranger.py'

@@ -13,7 +13,7 @@ from graph import Nodes, Observer, Process
 from maglev_node.topics import CURRENTS, MEASUREMENT, TRUE_STATE
 
 ELLIPSE = 'scenario_ellipse.yaml'
-LONG = 'duration:=600.0'
+LONG = 'duration:=200.0'
 WATCHED = 'watchers:=[observer]'  # by the test
 LOWER_STOP = 0.031
 
