@@ -122,8 +122,10 @@ if (($#)); then
 else
   # Three files at a time, for those with real nodes wait often, and a flight in lockstep bears what
   # the others take; then, with the machine to themselves, those that fly in real time.
-  run_pytest -p xdist -n 3 --dist loadfile --no-loadscope-reorder -m 'not alone' || code=$?
-  run_pytest -m alone test/graph test/model test/scenario test/study || code=$?
+  asked=${MAGLEV_LONG:+ or long}
+  run_pytest -p xdist -n 3 --dist loadfile --no-loadscope-reorder \
+    -m "not alone and (not long$asked)" || code=$?
+  run_pytest -m "alone and (not long$asked)" test/graph test/model test/scenario test/study || code=$?
 fi
 style=passed
 wait "$style_job" || style=failed

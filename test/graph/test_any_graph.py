@@ -160,6 +160,7 @@ def test_strangers_change_nothing_and_all_tell_stage_time(
     assert said[-1] in told
 
 
+@pytest.mark.long
 def test_two_stages_at_once_one_of_them_remapped(
     alone: np.ndarray, nodes: Nodes, watching: list[Observer]
 ) -> None:

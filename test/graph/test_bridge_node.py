@@ -261,8 +261,8 @@ def landed_softly(observer: Observer) -> bool:
     'signals',
     [
         (signal.SIGINT,),
-        (signal.SIGHUP,),
-        (signal.SIGINT, signal.SIGINT),
+        pytest.param((signal.SIGHUP,), marks=pytest.mark.long),
+        pytest.param((signal.SIGINT, signal.SIGINT), marks=pytest.mark.long),
         (signal.SIGINT, signal.SIGTERM),
     ],
 )

@@ -71,6 +71,7 @@ def test_the_page_shows_the_flight_and_its_buttons_act(flying: Process, watching
     assert mode(watching) == ControllerState.REGULATING
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not browser.found(), reason='there is no Chromium or Chrome here')
 def test_in_a_browser_the_scene_moves_and_the_emergency_stop_stops(
     flying: Process, watching: Observer, tmp_path: Path

@@ -73,6 +73,7 @@ def run(arguments: list[object], folder: Path, timeout: float) -> subprocess.Com
     )
 
 
+@pytest.mark.long
 def test_pip_installs_the_packages_and_six_lines_fly_the_ellipse(
     python: Path, tmp_path: Path
 ) -> None:

@@ -191,6 +191,7 @@ def test_two_stages_fly_on_one_domain_at_once_as_each_does_alone_and_unseen(
         assert np.array_equal(first[:shared], second[:shared]), f'{topic} differs'
 
 
+@pytest.mark.long
 def test_the_paper_on_its_own_model(tmp_path: Path) -> None:
     chosen = tmp_path / 'chosen.yaml'  # the other axes: test_closed_loop_figures.py
     chosen.write_text(
