@@ -16,20 +16,18 @@ from maglev_monitor.metrics.curves import StepCurves
 from maglev_monitor.metrics.readable import micro
 from maglev_monitor.report.drawing import (
     ERROR,
-    FLOOR,
     POSITION,
     REFERENCE,
     SECOND,
     STYLE,
-    TITLES,
     FloatArray,
     Plot,
     column,
     envelope,
     extremes,
     to_plot,
-    units,
 )
+from maglev_monitor.report.scales import FLOOR, TITLES, units
 from maglev_study.paper import STEPS, TRACKING, PublishedStep
 
 Runs = Mapping[str, Mapping[str, Analysis]]

@@ -30,15 +30,6 @@ REFERENCE, POSITION, ERROR, SECOND = '#8b949e', '#1f77c9', '#d55e00', '#009e73'
 COLOURS = (POSITION, ERROR, SECOND, '#cc79a7', '#e69f00', '#56b4e9', REFERENCE)
 """Told apart by colour-blind readers (Okabe and Ito, 2008), on white and on black."""
 
-TITLES = {
-    'y': 'air gap y',
-    'x': 'displacement x',
-    'z': 'displacement z',
-    'phi': 'tilt φ',
-    'theta': 'tilt θ',
-}
-FLOOR = 0.1  # of logarithmic error scales [µm, µrad]
-MOVES = 1e-7  # a reference that moves less stands still [m, rad]
 _INK, _GRID, _SHADE = '#7d8790', '#8b949e', '#56b4e9'
 _HEIGHT = 230  # of a panel [px]
 
@@ -62,11 +53,6 @@ class Column(NamedTuple):
 def column(name: str, index: int, scale: float = 1.0) -> Column:
     """The ``index``-th of the columns called ``name``."""
     return Column(COLUMNS[name].start + index, scale)
-
-
-def units(axis: str) -> tuple[str, str]:
-    """Units of an axis in thousandths and millionths."""
-    return ('mrad', 'µrad') if axis in ('phi', 'theta') else ('mm', 'µm')
 
 
 class Panels:

@@ -21,15 +21,6 @@ from maglev_monitor.metrics.envelope import Envelope
 FloatArray = NDArray[np.float64]
 
 REFERENCE, POSITION, ERROR, SECOND = '#9a9a9a', '#1f5fa8', '#c2452d', '#2a8a62'
-TITLES = {
-    'y': 'air gap y',
-    'x': 'displacement x',
-    'z': 'displacement z',
-    'phi': 'tilt φ',
-    'theta': 'tilt θ',
-}
-FLOOR = 0.1  # of logarithmic error scales [µm, µrad]
-MOVES = 1e-7  # a reference that moves less stands still [m, rad]
 STYLE = {
     'font.size': 9.0,
     'axes.grid': True,
@@ -64,10 +55,6 @@ def to_plot(title: str, caption: str, figure: Figure) -> Plot:
 
 def column(name: str, index: int) -> int:
     return int(COLUMNS[name].start) + index
-
-
-def units(axis: str) -> tuple[str, str]:
-    return ('mrad', 'µrad') if axis in ('phi', 'theta') else ('mm', 'µm')
 
 
 def extremes(curve: Envelope, column: int) -> FloatArray:

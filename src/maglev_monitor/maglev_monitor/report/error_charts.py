@@ -10,15 +10,14 @@ from maglev_monitor.bag.analysis import Analysis
 from maglev_monitor.report.chart import (
     COLOURS,
     ERROR,
-    MOVES,
     Chart,
     Panels,
     column,
     legend,
     line,
     no_legend,
-    units,
 )
+from maglev_monitor.report.scales import MOVES, units
 
 _WINDOW = 1024  # samples in a segment of the spectrum
 _LEAST_TAIL = 512  # samples of tracking that give a spectrum

@@ -15,12 +15,9 @@ from maglev_monitor.metrics.curves import COLUMNS, StepCurves
 from maglev_monitor.report.chart import (
     COLOURS,
     ERROR,
-    FLOOR,
-    MOVES,
     POSITION,
     REFERENCE,
     SECOND,
-    TITLES,
     Chart,
     Panels,
     band,
@@ -33,9 +30,9 @@ from maglev_monitor.report.chart import (
     mark,
     no_legend,
     shade,
-    units,
 )
 from maglev_monitor.report.error_charts import reversals, spectrum
+from maglev_monitor.report.scales import FLOOR, MOVES, TITLES, units
 
 FloatArray = NDArray[np.float64]
 

@@ -13,7 +13,6 @@ from maglev_monitor.bag.analysis import Analysis
 from maglev_monitor.metrics.readable import angle_or_length, micro, seconds
 from maglev_monitor.report.chart import (
     ERROR,
-    FLOOR,
     POSITION,
     Chart,
     Panels,
@@ -21,10 +20,10 @@ from maglev_monitor.report.chart import (
     legend,
     line,
     magnitude,
-    units,
 )
 from maglev_monitor.report.chart import render as render_charts
 from maglev_monitor.report.page import bullets, header, html_table, page, write_page
+from maglev_monitor.report.scales import FLOOR, units
 
 _COLOURS = (POSITION, ERROR)
 _FIGURES = (('mean_abs_error', 'mean |e|'), ('rms_error', 'rms e'), ('max_abs_error', 'max |e|'))

@@ -12,14 +12,13 @@ from bokeh.plotting import figure
 from maglev_model.axes import AXES, FloatArray
 from maglev_monitor.report.chart import (
     COLOURS,
-    FLOOR,
     Chart,
     Panels,
     legend,
     line,
     mark,
-    units,
 )
+from maglev_monitor.report.scales import FLOOR, units
 from maglev_study.robustness.fly import BINS, LOST
 from maglev_study.robustness.outcome import SHARES, Group
 

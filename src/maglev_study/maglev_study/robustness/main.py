@@ -122,11 +122,9 @@ class _Progress:
         self._started = time.monotonic()
         self._told = 0.0
         self._first = -1
-        self._lost = 0
 
     def __call__(self, done: int, wanted: int, new: Sequence[Flown]) -> None:
         """Hear of what has been flown."""
-        self._lost += any(one.verdict == 'lost' for one in new)
         if self._first < 0:
             self._first = done
         now = time.monotonic()
