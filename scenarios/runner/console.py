@@ -19,6 +19,11 @@ def talk_to(descriptor: int | None) -> None:
     _Console.talk = descriptor
 
 
+def quiet() -> bool:
+    """Whether nothing but errors is told."""
+    return _Console.talk is None
+
+
 def say(text: str, colour: str = '') -> None:
     """Print at once; in colour on a terminal."""
     if _Console.talk is not None:

@@ -59,6 +59,6 @@ def cannot_write(out: Path) -> WrongUseError:
 
 def say_where(out: Path) -> None:
     """What of a run is there, and where."""
-    for name in ('report.html', 'metrics.json', 'bag', 'params', 'log'):
+    for name in ('report.html', 'replay.html', 'metrics.json', 'bag', 'params', 'log'):
         if (out / name).exists():
             say(f'  {out / name}')

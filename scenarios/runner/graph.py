@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+import sys
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,11 +20,15 @@ _PACKAGES = {'recorder': 'maglev_monitor', 'web': 'maglev_view'}
 
 
 class Scenario(NamedTuple):
-    """What is flown: parameter files of params/ over the nodes' own, arguments of the reference."""
+    """What is flown: parameter files of params/ over the nodes' own, arguments of the reference.
+
+    ``offer`` is a file of params/ with internal models to match, for who has not chosen it.
+    """
 
     name: str
     files: tuple[str, ...]
     reference: tuple[str, ...] = ()
+    offer: str = ''
 
 
 class Flight(NamedTuple):
@@ -70,7 +76,8 @@ class Flight(NamedTuple):
 
     def _values(self, node: str) -> list[str]:
         if node == 'recorder':
-            return [f'output:={self.out}/bag']
+            asked = shlex.join([f'{sys.argv[1]}.sh', *sys.argv[2:]]).replace("'", "''")
+            return [f'output:={self.out}/bag', f"command:='{asked}'"]
         if node in VIEWS:
             return []
         mode = f'mode:={self.mode}'

@@ -24,6 +24,9 @@ SECTIONS = (
     '**',
 )
 
+DISTRIBUTIONS = 'robustness'
+"""The section of what machines are drawn from, which no node hears."""
+
 
 def overlay(option: str, name: str) -> str:
     """The path of a file in the current folder or in params/, there also without ``.yaml``."""
@@ -41,7 +44,7 @@ def check_overlay(path: str, namespace: str = '', sections: Sequence[str] = SECT
     """Refuse a file that no node would take, or that speaks to none. Needs the environment.
 
     :param namespace: that of the nodes, with which sections may name them too.
-    :param sections: those that are heard.
+    :param sections: those that are heard; of nodes that are not there it may speak besides.
     """
     if sys.flags.no_site:
         site.main()
@@ -55,9 +58,12 @@ def check_overlay(path: str, namespace: str = '', sections: Sequence[str] = SECT
         raise WrongUseError(f'--params: {error}') from error
     loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
     content = yaml.compose(Path(path).read_text(encoding='utf-8'), Loader=loader)
-    for key, _ in content.value if content else ():
-        if key.value.removeprefix(f'{namespace}/').lstrip('/') not in sections:
+    given = [key.value for key, _ in content.value] if content else []
+    names = [name.removeprefix(f'{namespace}/').lstrip('/') for name in given]
+    some = any(name in sections for name in names)
+    for name, written in zip(names, given, strict=True):
+        if name not in sections and not (some and name in (*SECTIONS, DISTRIBUTIONS)):
             raise WrongUseError(
-                f"--params: '{path}' has parameters for '{key.value}',"
+                f"--params: '{path}' has parameters for '{written}',"
                 f' which is no node here: {", ".join(sections)}'
             )

@@ -11,9 +11,11 @@ from runner.folder import make_folder, say_where
 from runner.graph import START_ORDER, STOP_ORDER, Flight
 from runner.logs import NodeLog
 from runner.overlays import check_overlay
-from runner.process import Process, program, run_to_end
+from runner.process import Process, last_words, program, run_to_end
 from runner.signals import Signals
 
+NO_VISER = 3
+"""The exit code of ``replay`` where what it needs is no part of the set-up."""
 TALKERS = ('monitor', 'web')
 """Nodes of which the terminal shows everything."""
 
@@ -28,13 +30,17 @@ def fly(flight: Flight, signals: Signals) -> int:
         check_overlay(path, flight.namespace)
     commands = {node: flight.program(node) for node in (*START_ORDER, *flight.views)}
     analyze = program('maglev_monitor', 'analyze')
+    replay = program('maglev_view', 'replay') if 'view' in flight.views else None
     flight = flight._replace(out=make_folder(flight.out))
     name = flight.scenario.name
     where = f' in {flight.namespace}' if flight.namespace else ''
     say(f'{name}: {flight.stage}, {flight.mode}{where}, into {flight.out}')
+    offer = flight.scenario.offer
+    if offer and all(Path(path).name != offer for path in flight.overlays):
+        say(f'{name}: internal models that match it: --params {offer.removesuffix(".yaml")}')
     run = Run(flight, signals)
     try:
-        passed = run.measure(commands) and not signals.code and run.judge(analyze)
+        passed = run.measure(commands) and not signals.code and run.judge(analyze, replay)
     except OSError as error:
         complain(f'{name}: failed: {error}')
         passed = False
@@ -46,18 +52,18 @@ def fly(flight: Flight, signals: Signals) -> int:
         complain(f'{name}: FAILED, see {flight.out}')
     say_where(flight.out)
     if flight.as_json:
-        write(outcome(flight, passed))
+        write(json.dumps(outcome(flight, passed)))
     return signals.code or int(not passed)
 
 
-def outcome(flight: Flight, passed: bool) -> str:
-    """What came of a flight, with the content of its metrics.json, as one line of JSON."""
+def outcome(flight: Flight, passed: bool) -> dict[str, object]:
+    """What came of a flight, with the content of its metrics.json."""
     try:
         figures = json.loads((flight.out / 'metrics.json').read_text(encoding='utf-8'))
     except (OSError, ValueError):
         figures = None
     facts = {'scenario': flight.scenario.name, 'stage': flight.stage, 'mode': flight.mode}
-    return json.dumps({**facts, 'out': str(flight.out), 'passed': passed, 'metrics': figures})
+    return {**facts, 'out': str(flight.out), 'passed': passed, 'metrics': figures}
 
 
 class Run:
@@ -92,9 +98,12 @@ class Run:
                     self._nodes[node].stop(self._pause)
             self._show(rest=True)
 
-    def judge(self, analyze: Sequence[str]) -> bool:
+    def judge(self, analyze: Sequence[str], replay: Sequence[str] | None) -> bool:
         """Whether the nodes ended cleanly, there is a report, and the limits are kept."""
-        clean, reported = self._clean_ends(), self._report(analyze)
+        clean = self._clean_ends()
+        if replay:
+            self._replay(replay)
+        reported = self._report(analyze)
         return clean and reported and self._nodes['monitor'].code == 0
 
     def _watch(self) -> bool:
@@ -131,6 +140,16 @@ class Run:
                 self._complain(f'failed: {node} did not end cleanly, exit code {code}{words}')
                 clean = False
         return clean
+
+    def _replay(self, replay: Sequence[str]) -> None:
+        """Make the flight in 3D, to which the report leads; a run is none the worse without it."""
+        log = self._log('replay')
+        code = run_to_end(
+            [*replay, f'{self._out}/bag', '--out', str(self._out)], self._signals, log
+        )
+        if code:
+            tell = say if code == NO_VISER else complain
+            tell(f'{self._name}: no replay: {last_words(log)}')
 
     def _report(self, analyze: Sequence[str]) -> bool:
         log, report = self._log('analyze'), self._out / 'report.html'

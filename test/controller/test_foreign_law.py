@@ -18,7 +18,8 @@ from maglev_controller.foreign_law import Measurement, Reference
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
 from maglev_controller.supervision import Supervisor
-from maglev_model.inverse import CURRENT, CurrentLimits, exact_currents
+from maglev_model.currents import exact_currents
+from maglev_model.inverse import CURRENT, CurrentLimits
 from maglev_model.machine import machine_constants
 from maglev_model.modes import Mode
 from maglev_model.parameters import ParameterError, build

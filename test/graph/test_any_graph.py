@@ -148,15 +148,21 @@ def test_strangers_change_nothing_and_all_tell_stage_time(
         since = [nanoseconds(message.header.stamp) - begin for message in messages]
         assert since == [1_000_000 * message.sequence for message in messages], topic
     assert all(message.lockstep for message in observer.messages[MEASUREMENT])
+    said = [0]  # before it has heard the clock
+
+    def heard() -> int:
+        said.extend(
+            nanoseconds(message.header.stamp)
+            for message, _ in diagnostics.take()
+            if message.status[0].name == 'plant'
+        )
+        return said[-1]
+
+    observer.wait(lambda: heard() > 0)
     told = taken(clock)
     steps = np.unique(told)
     assert steps[0] == begin
     assert set(np.diff(steps)) == {10_000_000}
-    said = [
-        nanoseconds(message.header.stamp)
-        for message, _ in diagnostics.take()
-        if message.status[0].name == 'plant'
-    ]
     assert said[-1] in told
 
 
@@ -200,7 +206,7 @@ def test_help(name: str) -> None:
     assert 'diagnostics' in done.stdout
     if name == 'plant':
         assert "mode: string, default 'lockstep', one of lockstep, realtime" in done.stdout
-        assert 'answer_timeout: double [s], default 5.0, [0.1, 600] s' in done.stdout
+        assert 'answer_timeout: double [s], default 8.0, [0.1, 600] s' in done.stdout
         assert 'stage/true_state' in done.stdout
 
 

@@ -10,6 +10,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from flight import BRISK, ELLIPSE, LOWER_STOP
 from graph import PARAMS, Nodes, Observer, Process
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
@@ -25,9 +26,7 @@ from maglev_node.topics import (
     sample_qos,
 )
 
-LOWER_STOP = 0.031
 FILES = {'plant': ('benchmark.yaml',), 'hw_bridge': ('hw_bridge.yaml',)}
-ELLIPSE = 'scenario_ellipse.yaml'
 
 
 class Life:
@@ -188,23 +187,30 @@ def test_bad_parameters_are_one_clear_line(arguments: list[str], text: str, node
 
 
 def fly(
-    nodes: Nodes, observer: Observer, mode: str = 'lockstep', stage: Process | None = None
+    nodes: Nodes,
+    observer: Observer,
+    *arguments: str,
+    mode: str = 'lockstep',
+    stage: Process | None = None,
 ) -> dict[str, Process]:
     """Bridge, controller and reference on the ellipse, until it is airborne."""
     observer.watch(MEASUREMENT, REFERENCE, CURRENTS, CONTROLLER_STATE, TRUE_STATE)
     common = f'mode:={mode}', 'watchers:=[observer]'  # by the test
     graph = {
-        'stage': stage
-        or nodes.start('hw_bridge', *common, 'answer_timeout:=1.0', params=FILES['hw_bridge']),
+        'stage': stage or nodes.start('hw_bridge', *common, *arguments, params=FILES['hw_bridge']),
         'controller': nodes.start('controller', *common),
-        'reference': nodes.start('reference', *common, 'duration:=600.0', params=(ELLIPSE,)),
+        'reference': nodes.start(
+            *('reference', *common, 'duration:=600.0', *BRISK), params=(ELLIPSE,)
+        ),
     }
-    observer.wait(lambda: height(observer) < 0.026, timeout=60)
+    lost = 'left the run'
+    observer.wait(lambda: height(observer) < 0.026 or lost in graph['reference'].output)
+    assert lost not in graph['reference'].output
     return graph
 
 
 def test_a_dead_controller(nodes: Nodes, observer: Observer) -> None:
-    graph = fly(nodes, observer)
+    graph = fly(nodes, observer, 'answer_timeout:=2.0')
     life = Life(observer, 'hw_bridge')
     graph['controller'].kill()
     observer.wait(lambda: height(observer) > LOWER_STOP - 1e-5)
@@ -218,8 +224,9 @@ def test_a_dead_controller(nodes: Nodes, observer: Observer) -> None:
 
 
 @pytest.mark.alone
+@pytest.mark.real_time
 def test_in_real_time_emulated_boards_bear_a_desktop(nodes: Nodes, observer: Observer) -> None:
-    graph = fly(nodes, observer, 'realtime')
+    graph = fly(nodes, observer, mode='realtime')
     before = observer.newest(MEASUREMENT).sequence
     graph['stage'].signal(signal.SIGSTOP)
     time.sleep(0.1)  # far longer than the boards' watchdog
@@ -260,7 +267,7 @@ def landed_softly(observer: Observer) -> bool:
 @pytest.mark.parametrize(
     'signals',
     [
-        (signal.SIGINT,),
+        pytest.param((signal.SIGINT,), marks=pytest.mark.long),
         pytest.param((signal.SIGHUP,), marks=pytest.mark.long),
         pytest.param((signal.SIGINT, signal.SIGINT), marks=pytest.mark.long),
         (signal.SIGINT, signal.SIGTERM),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 
 import pytest
-from flight import WATCHED
+from flight import BRISK, WATCHED
 from graph import Nodes, Observer
 
 from maglev_msgs.msg import Reference
@@ -29,6 +29,7 @@ def test_land_swap_lift_off(nodes: Nodes, observer: Observer) -> None:
         WATCHED,
         'autostart:=false',
         'duration:=600.0',
+        *BRISK,
         params=('scenario_ellipse.yaml',),
     )
     observer.wait(lambda: observer.newest(REFERENCE) is not None)

@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
-from flight import ELLIPSE, LONG, LOWER_STOP, WATCHED, airborne, gap, impact_speed
+from flight import BRISK, ELLIPSE, LONG, LOWER_STOP, WATCHED, airborne, gap, impact_speed
 from graph import Nodes, Observer, Process
 from std_srvs.srv import Trigger
 
@@ -23,7 +23,7 @@ FAILING = Path(__file__).resolve().parents[1] / 'support' / 'failing_controller.
 TIRED = """
 class Tired:
     def reset(self):
-        self.left = 2500
+        self.left = 1500
 
     def step(self, measurement, reference):
         self.left -= 1
@@ -46,7 +46,7 @@ def fly(
         graph['controller'] = nodes.run('controller', command)
     else:
         graph['controller'] = nodes.start('controller', WATCHED, *controller)
-    graph['reference'] = nodes.start('reference', LONG, WATCHED, params=(ELLIPSE,))
+    graph['reference'] = nodes.start('reference', LONG, WATCHED, *BRISK, params=(ELLIPSE,))
     observer.wait(lambda: airborne(observer), timeout=180.0)
     return graph
 
@@ -78,23 +78,33 @@ def test_its_emergency_stop_lands_and_stays(nodes: Nodes, watching: Observer) ->
     assert len({m.session for m in sent}) == 1
 
 
-@pytest.mark.parametrize(
-    'signals', [(signal.SIGINT, signal.SIGINT), (signal.SIGINT, signal.SIGTERM)]
-)
-def test_two_signals_at_once_land_as_one_does(
-    nodes: Nodes, watching: Observer, signals: tuple[signal.Signals, ...]
-) -> None:
+def test_two_signals_at_once_land_as_one_does(nodes: Nodes, watching: Observer) -> None:
     graph = fly(nodes, watching)
-    for number in signals:
+    for number in (signal.SIGINT, signal.SIGTERM):
         graph['controller'].signal(number)
         time.sleep(0.01)
     landed_softly(watching)
     assert graph['controller'].wait() == 0
     assert 'fault' not in graph['stage'].output
+    judge_whose_currents_flow(watching)
 
 
-def test_a_defect_beside_the_loop_is_a_landing_of_its_own(nodes: Nodes, watching: Observer) -> None:
-    graph = fly(nodes, watching, 'beside')
+def judge_whose_currents_flow(watching: Observer) -> None:
+    """With each sample the stage says whose currents it follows: the flying controller's."""
+    topics = watching.look()
+    flown = {m.sequence: m.session for m in topics[CURRENTS] if m.status == Currents.FLYING}
+    said = {m.sequence: m.controller for m in topics[MEASUREMENT]}
+    assert set(said.values()) == {0, *flown.values()}
+    follow = [number for number in flown if flown.get(number - 1) and number in said]
+    assert len(follow) > 1000
+    assert all(said[number] == flown[number] for number in follow)
+
+
+@pytest.mark.parametrize('how', ['beside', 'in_loop'])
+def test_a_defect_where_references_are_taken_is_a_landing_of_its_own(
+    nodes: Nodes, watching: Observer, how: str
+) -> None:
+    graph = fly(nodes, watching, how)
     assert graph['controller'].wait(120.0) == 70
     landed_softly(watching)
     assert 'landing at sample' in graph['controller'].output
@@ -165,19 +175,6 @@ def test_into_the_flight_of_another_controller_none_speaks(
     assert controller.output.count('silent') == 1
 
 
-def test_the_stage_says_whose_currents_flow(nodes: Nodes, watching: Observer) -> None:
-    graph = fly(nodes, watching)
-    graph['controller'].signal(signal.SIGINT)
-    landed_softly(watching)
-    topics = watching.look()
-    flown = {m.sequence: m.session for m in topics[CURRENTS] if m.status == Currents.FLYING}
-    said = {m.sequence: m.controller for m in topics[MEASUREMENT]}
-    assert set(said.values()) == {0, *flown.values()}
-    follow = [number for number in flown if flown.get(number - 1) and number in said]
-    assert len(follow) > 1000
-    assert all(said[number] == flown[number] for number in follow)
-
-
 def test_during_a_redesign_the_emergency_stop_is_served(nodes: Nodes, watching: Observer) -> None:
     fly(nodes, watching)
     client = watching.node.create_client(Trigger, '/controller/emergency_stop')
@@ -186,8 +183,7 @@ def test_during_a_redesign_the_emergency_stop_is_served(nodes: Nodes, watching: 
     watching.serve(0.3)
     assert not changing.done()
     watching.ask(client, Trigger.Request())
-    stopped = [m for m in watching.look()[CONTROLLER_STATE] if m.mode == ControllerState.LANDING]
     assert not changing.done()
-    assert stopped
+    watching.wait(lambda: watching.newest(CONTROLLER_STATE).mode == ControllerState.LANDING)
     landed_softly(watching)
     assert watching.answer(changing).result is not None

@@ -52,6 +52,14 @@ def test_no_shared_memory_stays(
     assert not [path for path in held if path.exists()]
 
 
+def test_what_never_waits_in_real_time_ends_in_order_and_says_so(nodes: Nodes) -> None:
+    stage = nodes.start('plant')
+    stage.wait_for('activate: active')
+    stage.signal(signal.SIGXCPU)
+    assert stage.wait() == 1
+    assert 'too slow or too busy for real time' in stage.output
+
+
 def test_what_a_killed_process_has_locked_keeps_no_node_from_coming_up(nodes: Nodes) -> None:
     if get_rmw_implementation_identifier() != 'rmw_fastrtps_cpp':
         pytest.skip('only Fast DDS locks ports in shared memory')

@@ -42,7 +42,7 @@ def errors_on_time(observer: Observer, first: int) -> np.ndarray:
 
 
 def test_lift_off_ellipse_landing(nodes: Nodes, watching: Observer) -> None:
-    graph = fly(nodes, 'duration:=2.0', 'exit_at_end:=true')
+    graph = fly(nodes, 'duration:=1.0', 'exit_at_end:=true')
     watching.wait(lambda: not graph['reference'].running, timeout=60)
     assert graph['reference'].wait() == 0, graph['reference'].output
     watching.wait(lambda: landed_without_current(watching))
@@ -82,11 +82,10 @@ def test_all_that_a_flight_bears(nodes: Nodes, watching: Observer) -> None:
     """Second nodes, new parameters, a landing and another lift-off, the controller's end."""
     graph = fly(nodes, LONG)
     watching.wait(lambda: airborne(watching))
-    for name in graph:
-        second = nodes.start(name)
+    for second in [nodes.start(name) for name in graph]:
         assert second.wait() == 1
         assert 'there is another' in second.output
-        assert all(process.running for process in graph.values())
+    assert all(process.running for process in graph.values())
 
     retune(graph, watching, bound=50e-6)
 
@@ -109,6 +108,7 @@ def test_all_that_a_flight_bears(nodes: Nodes, watching: Observer) -> None:
 
 
 @pytest.mark.alone
+@pytest.mark.real_time
 def test_real_time_also_when_a_process_was_stopped(nodes: Nodes, watching: Observer) -> None:
     graph = fly(nodes, LONG, mode='realtime')
     watching.wait(lambda: watching.newest(REFERENCE) is not None)
@@ -160,6 +160,7 @@ def retune(graph: dict[str, Process], watching: Observer, bound: float) -> None:
 
 
 @pytest.mark.alone
+@pytest.mark.real_time
 def test_retuning_in_real_time(nodes: Nodes, watching: Observer) -> None:
     graph = fly(nodes, LONG, mode='realtime')
     watching.wait(lambda: watching.newest(REFERENCE) is not None)

@@ -1,13 +1,13 @@
-"""A trajectory on the fly, over DDS, to real nodes: followed from a hover, or refused."""
+"""Trajectory and step on the fly, over DDS, to real nodes: followed from a hover, or refused."""
 
 from __future__ import annotations
 
 import pytest
-from flight import WATCHED
+from flight import WATCHED, samples
 from graph import Nodes, Observer
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from maglev_msgs.msg import Reference
+from maglev_msgs.srv import Step
 from maglev_node.topics import REFERENCE, TRUE_STATE
 
 HOVERING = ('trajectory:=hold', 'duration:=600.0', 'run_in:=0.0', 'move_time:=0.3')
@@ -31,9 +31,19 @@ def test_it_is_followed_from_the_hover_or_refused(nodes: Nodes, watching: Observ
     reference.wait_for('trajectory refused: unreachable reference: x is', timeout=60.0)
     publisher.publish(to_x(0.01))
     reference.wait_for('following a trajectory of 0.5 s, then hovering', timeout=60.0)
-    watching.wait(lambda: watching.newest(REFERENCE).phase == Reference.HOLD, timeout=60.0)
-    begun = watching.newest(TRUE_STATE).sequence
-    watching.wait(lambda: watching.newest(TRUE_STATE).sequence > begun + 500, timeout=60.0)
+    watching.wait(lambda: watching.newest(REFERENCE).position[1] == pytest.approx(0.01))
+    samples(watching, 500)
+    assert watching.newest(TRUE_STATE).state[2] == pytest.approx(0.01, abs=5e-5)
+    client = watching.node.create_client(Step, 'reference/step')
+    refused = watching.ask(client, Step.Request(axis='z', distance=0.055))
+    assert not refused.success
+    assert 'step refused: unreachable reference: z is 0.05' in refused.message
+    taken = watching.ask(client, Step.Request(axis='y', distance=-0.001))
+    assert taken.success
+    assert taken.message == 'y steps in 0.2 s, then hovers'
+    watching.wait(lambda: watching.newest(REFERENCE).position[0] == pytest.approx(0.024))
+    samples(watching, 500)
+    assert watching.newest(TRUE_STATE).state[0] == pytest.approx(0.024, abs=5e-5)
     assert watching.newest(TRUE_STATE).state[2] == pytest.approx(0.01, abs=5e-5)
     assert watching.call('/reference/land').success
     reference.wait_for('END at sample', timeout=60.0)

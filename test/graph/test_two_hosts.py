@@ -93,6 +93,7 @@ def sample(process: Process, words: str) -> int:
 
 
 @pytest.mark.alone
+@pytest.mark.real_time
 def test_in_real_time_a_cut_cable_lands_and_only_resets_fly_again(
     nodes: Nodes, hosts: TwoHosts, tmp_path: Path
 ) -> None:
@@ -100,7 +101,14 @@ def test_in_real_time_a_cut_cable_lands_and_only_resets_fly_again(
 
     def reference(*arguments: str) -> Process:
         return nodes.start(
-            *('reference', 'mode:=realtime', 'duration:=600.0', *REFERENCE, *arguments),
+            *(
+                'reference',
+                'mode:=realtime',
+                'duration:=600.0',
+                'timeout:=2.0',
+                *REFERENCE,
+                *arguments,
+            ),
             params=('scenario_ellipse.yaml',),
             on=law,
         )
@@ -113,7 +121,7 @@ def test_in_real_time_a_cut_cable_lands_and_only_resets_fly_again(
     )
     nodes.start('controller', 'mode:=realtime', on=law)
     first = reference()
-    first.wait_for('TRACK at sample', PATIENCE)
+    first.wait_for('TRACK at sample', PATIENCE, unless='left the run')
     hosts.cut()
     fault = sample(bridge, 'fault at sample')
     assert first.wait() == 1
@@ -125,7 +133,7 @@ def test_in_real_time_a_cut_cable_lands_and_only_resets_fly_again(
     answers = [line.split()[0] for line in calls.output.splitlines()]
     assert answers[:1] + answers[2:] == ['no', 'yes', 'yes', 'yes'], calls.output
     again = sample(second, 'LIFT_OFF at sample')
-    second.wait_for('TRACK at sample', PATIENCE)
+    second.wait_for('TRACK at sample', PATIENCE, unless='left the run')
     recorder.signal(signal.SIGINT)
     assert recorder.wait() == 0
 

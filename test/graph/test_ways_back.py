@@ -37,7 +37,7 @@ def test_a_controller_disabled_or_in_a_fault_is_not_flown_with(
     nodes: Nodes, watching: Observer
 ) -> None:
     """Lift-off is refused while it is disabled; after its emergency stop only a lift-off flies."""
-    graph = fly(nodes, LONG, 'lift_off.time:=6.0', controller=('enabled:=false',))
+    graph = fly(nodes, LONG, 'lift_off.time:=4.0', controller=('enabled:=false',))
     watching.wait(lambda: watching.newest(CONTROLLER_STATE) is not None)
     graph['reference'].wait_for('resting, the controller is disabled: call /controller/enable')
     answer = watching.call('/reference/lift_off')
@@ -79,7 +79,7 @@ def test_a_controller_disabled_or_in_a_fault_is_not_flown_with(
 
 def test_emergency_stops_in_flight_and_the_way_back(nodes: Nodes, watching: Observer) -> None:
     """The controller's lands and is latched; the plant's too, and off its stop none lifts off."""
-    graph = fly(nodes, LONG)
+    graph = fly(nodes, LONG, 'trajectory:=hold')  # where the magnets bear more than the weight
     watching.wait(lambda: airborne(watching))
     assert watching.call('/controller/emergency_stop').success
     watching.wait(lambda: mode(watching) == ControllerState.FAULT)
@@ -122,13 +122,14 @@ def test_mixed_modes_are_refused(nodes: Nodes, name: str, stage: str) -> None:
     ours = {'lockstep': 'realtime', 'realtime': 'lockstep'}[stage]
     other = nodes.start(name, f'mode:={ours}')
     assert other.wait() == 1
-    assert f"the stage runs in mode '{stage}', this node in mode '{ours}'" in other.output
+    said = f"the stage runs in mode '{stage}', this node in mode '{ours}'"
+    assert other.output.count(said) == 1  # however many measurements had queued up
 
 
 def test_nothing_hurries_after_the_end_and_a_dead_controller_is_noticed(
     nodes: Nodes, watching: Observer
 ) -> None:
-    graph = fly(nodes, 'duration:=0.5', 'timeout:=4.0', answer_timeout=3.0)
+    graph = fly(nodes, 'duration:=0.5', 'timeout:=4.0', plant=('answer_timeout:=3.0',))
     watching.wait(lambda: watching.newest(REFERENCE) is not None)
     watching.wait(lambda: phase(watching) == Reference.END)
     samples(watching, 1100)

@@ -13,9 +13,15 @@ from page_client import PageClient
 
 from maglev_msgs.msg import ControllerState
 from maglev_node.topics import CONTROLLER_STATE
+from maglev_view.parameters import WebParameters
+from maglev_view.web.page import Page
 
 PLATEN = '/stage_link/platen_link'
 AT_REST = -0.031
+
+needs_browser = pytest.mark.skipif(
+    not browser.found(), reason='there is no Chromium or Chrome here'
+)
 
 
 @pytest.fixture
@@ -62,6 +68,8 @@ def test_the_page_shows_the_flight_and_its_buttons_act(flying: Process, watching
     watching.wait(lambda: mode(watching) == ControllerState.DISABLED)
     page.press('Enable')
     watching.wait(lambda: mode(watching) == ControllerState.WAITING)
+    page.press('Step')
+    page.wait(lambda: '/reference/step: step refused: the reference does not hover' in page.text())
     page.press('Lift off')
     watching.wait(lambda: airborne(watching))
     page.close()
@@ -71,8 +79,37 @@ def test_the_page_shows_the_flight_and_its_buttons_act(flying: Process, watching
     assert mode(watching) == ControllerState.REGULATING
 
 
+def test_the_fields_of_the_page_go_with_its_step() -> None:
+    page = Page(WebParameters(port=0), 'test')
+    client = PageClient(page.address, origin=page.address)
+    client.wait(lambda: 'Step' in client.buttons())
+    client.press('Step')
+    assert page.wishes.get(timeout=10.0) == ('Step', {'axis': 'x', 'distance': 1e-4})
+    client.press('Land')
+    assert page.wishes.get(timeout=10.0) == ('Land', {})
+    client.close()
+    page.close()
+
+
 @pytest.mark.long
-@pytest.mark.skipif(not browser.found(), reason='there is no Chromium or Chrome here')
+@needs_browser
+def test_the_page_is_dark_in_a_dark_browser_and_fits_a_phone(tmp_path: Path) -> None:
+    served = Page(WebParameters(port=0), 'test')
+    page = browser.Browser(tmp_path / 'profile')
+    try:
+        page.darken()
+        page.resize(390, 844)
+        page.open(served.address)
+        page.wait('document.documentElement.dataset.mantineColorScheme == "dark"')
+        page.wait('[...document.querySelectorAll("button")].some(b => b.innerText == "Land")')
+        assert 'initialCameraPosition=' in page.evaluate('location.search')
+    finally:
+        page.close()
+        served.close()
+
+
+@pytest.mark.long
+@needs_browser
 def test_in_a_browser_the_scene_moves_and_the_emergency_stop_stops(
     flying: Process, watching: Observer, tmp_path: Path
 ) -> None:

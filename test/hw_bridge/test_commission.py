@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -67,21 +68,23 @@ def test_a_machine_that_is_right() -> None:
     assert boards.rig.impact < 0.05
 
 
-@pytest.mark.parametrize('phase', [0, 8])
+@pytest.mark.parametrize('phase', [pytest.param(0, marks=pytest.mark.long), 8])
 def test_a_phase_turned_round(phase: int) -> None:
     sign = flipped(DEFAULT.amplifier.sign, phase)
     with pytest.raises(WrongError, match=rf'sign of element {phase} of amplifier\.sign'):
         commission({'amplifier.sign': sign})
 
 
-@pytest.mark.parametrize('encoder', [1, 4])
+@pytest.mark.parametrize('encoder', [pytest.param(1, marks=pytest.mark.long), 4])
 def test_an_encoder_that_counts_the_other_way(encoder: int) -> None:
     direction = flipped(DEFAULT.encoder.direction, encoder)
     with pytest.raises(WrongError, match=rf'sign of element {encoder} of encoder\.direction'):
         commission({'encoder.direction': direction})
 
 
-@pytest.mark.parametrize('pair', [(1, 2), (1, 8), (4, 10)])
+@pytest.mark.parametrize(
+    'pair', [(1, 2), *(pytest.param(pair, marks=pytest.mark.long) for pair in ((1, 8), (4, 10)))]
+)
 def test_exchanged_phases(pair: tuple[int, int]) -> None:
     amplifier = DEFAULT.amplifier
     claimed = {
@@ -143,8 +146,15 @@ def test_the_executable(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
     wrong.write_text(yaml.safe_dump(content))
     assert run(['--params', str(PARAMS), '--yes']) == 0
     assert 'all is well' in capsys.readouterr().out
-    assert run(['--params', str(PARAMS), '--params', str(wrong), '--yes']) == 1
-    assert 'element 5 of encoder.direction' in capsys.readouterr().err
+    assert run(['--params', str(PARAMS), '--params', str(wrong), '--yes', '--json']) == 1
+    captured = capsys.readouterr()
+    assert 'element 5 of encoder.direction' in captured.err
+    outcome = json.loads(captured.out)
+    assert outcome['passed'] is False
+    assert 'element 5 of encoder.direction' in outcome['said'][-1]
+    with pytest.raises(SystemExit):
+        run(['--params', str(PARAMS), '--quiet'])
+    assert '--quiet needs --yes' in capsys.readouterr().err
     assert run(['--params', str(tmp_path / 'none.yaml')]) == 1
     assert 'cannot read' in capsys.readouterr().err
 

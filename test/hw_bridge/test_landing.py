@@ -9,7 +9,8 @@ from bridge_flight import OMEGA, Flight, ellipse, hover
 from maglev_hw_bridge.landing import Landing, impact_of_cut, impacts_of_cut
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.stage import Mode
-from maglev_model.inverse import CurrentLimits, exact_currents
+from maglev_model.currents import exact_currents
+from maglev_model.inverse import CurrentLimits
 from maglev_model.machine import machine_constants
 from maglev_model.motor import vertical_force
 from maglev_model.platen import output_accelerations

@@ -1,11 +1,14 @@
-"""A command's end, with and without a reader of what it prints."""
+"""A command's end, with and without a reader of what it prints; its signals."""
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 
 import pytest
+
+from maglev_model.command import noted
 
 PROGRAM = """
 import sys
@@ -51,3 +54,15 @@ def test_a_defect_shows() -> None:
     code, _, errors = run('1 / 0', '| cat')
     assert code == 1
     assert 'ZeroDivisionError' in errors
+
+
+def test_a_signal_is_noted_and_the_second_does_what_it_did_before() -> None:
+    with noted(signal.SIGINT, signal.SIGTERM) as caught:
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGTERM)
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+    assert caught == [signal.SIGINT, signal.SIGTERM]
+    assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)

@@ -253,7 +253,8 @@ def test_the_truth_is_of_the_sample_read_last(stage: Stage) -> None:
             assert truth.state.shape == (10,)
             assert truth.state[0] == pytest.approx(np.mean(sample.gap), abs=1e-5)
             truths.append(truth)
-    assert [len(array) for array in truths[0][1:]] == [4, 4, 4]
+            assert truth.own_length == pytest.approx([*sample.gap, sample.x, sample.z], abs=5.1e-6)
+    assert [len(array) for array in truths[0][1:]] == [4, 4, 4, 6]
     assert truths[23].direct_current == pytest.approx(LIFTING, abs=2e-2)
     assert truths[35].direct_current == pytest.approx(FALLING, abs=2e-2)
     assert not truths[35].quadrature_current.any()

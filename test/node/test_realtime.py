@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
+
+import pytest
 
 CODE = """
 import re, resource, os
@@ -17,6 +20,58 @@ more = bytearray(50_000_000)  # can still be had
 taken = take_priority(40)
 assert taken == (os.sched_getscheduler(0) == os.SCHED_FIFO)
 """
+
+THREADS = """
+import os, pathlib, rclpy
+from maglev_node.realtime import take_priority
+from maglev_node.topics import REFERENCE, SAMPLE_TOPICS, reference_qos
+
+rclpy.init()
+node = rclpy.create_node('made_up')
+node.create_publisher(SAMPLE_TOPICS[REFERENCE], REFERENCE, reference_qos())
+for priority in {priorities}:
+    if not take_priority(priority):
+        print('not permitted')
+        break
+    for thread in pathlib.Path('/proc/self/task').iterdir():
+        own = os.sched_getparam(int(thread.name)).sched_priority
+        print(priority, own, thread.joinpath('comm').read_text().strip(), flush=True)
+os._exit(0)
+"""
+
+
+def test_a_thread_that_spins_gives_way_to_the_one_it_waits_for() -> None:
+    code = THREADS.format(priorities=(1, 40))
+    done = subprocess.run([sys.executable, '-c', code], check=True, capture_output=True, text=True)
+    if 'not permitted' in done.stdout:
+        pytest.skip('no real-time priority here (ulimit -r)')
+    threads = [line.split(maxsplit=2) for line in done.stdout.splitlines()]
+    for priority in ('1', '40'):
+        below = [name for given, own, name in threads if given == priority and own != given]
+        assert below
+        assert all(name.startswith('dds.asyn') for name in below)
+        assert not any(
+            name.startswith('dds.asyn') for *same, name in threads if same == [priority] * 2
+        )
+
+
+@pytest.mark.parametrize(
+    ('deaf', 'ends'), [(False, signal.SIGXCPU), (True, signal.SIGKILL)], ids=['told', 'killed']
+)
+def test_what_spins_without_end_ends_not_the_machine(deaf: bool, ends: signal.Signals) -> None:
+    code = (
+        f'import signal; {deaf} and signal.signal(signal.SIGXCPU, signal.SIG_IGN)\n'
+        'from maglev_node import realtime\n'
+        'realtime._LONGEST_BURST = 300_000, 600_000\n'
+        'if not realtime.take_priority(1): raise SystemExit("not permitted")\n'
+        'while True: pass\n'
+    )
+    done = subprocess.run(
+        [sys.executable, '-c', code], check=False, capture_output=True, text=True, timeout=60
+    )
+    if 'not permitted' in done.stderr:
+        pytest.skip('no real-time priority here (ulimit -r)')
+    assert done.returncode == -ends
 
 
 def test_what_is_permitted_is_taken() -> None:

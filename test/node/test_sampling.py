@@ -20,6 +20,9 @@ from maglev_node.topics import MEASUREMENT, TRUE_STATE
 ZERO = np.zeros(4)
 
 
+_TRUTH = Truth(np.arange(10.0), ZERO + 1.0, ZERO + 2.0, ZERO + 3.0, np.full(6, 4.0))
+
+
 class MadeUpStage:
     """Notes its calls; flies from currents until it has been held ``endurance`` times."""
 
@@ -35,7 +38,7 @@ class MadeUpStage:
         self.ages: list[int] = []
         self.failing = False
         self.endurance = 3
-        self._truth = Truth(np.arange(10.0), ZERO + 1.0, ZERO + 2.0, ZERO + 3.0) if truth else None
+        self._truth = _TRUTH if truth else None
 
     def _call(self, name: str) -> None:
         self.calls.append(name)
@@ -171,6 +174,7 @@ def test_the_truth_goes_out_beside_the_measurement() -> None:
     assert (state.sequence, list(state.state)) == (3, list(range(10)))
     assert state.header.stamp == node.topics[Measurement].newest.header.stamp
     assert [list(state.direct_current), list(state.thermal_load)] == [[1.0] * 4, [3.0] * 4]
+    assert list(state.own_length) == [4.0] * 6
     assert PlantState not in start(MadeUpStage())[1].topics
 
 

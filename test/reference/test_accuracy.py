@@ -117,6 +117,17 @@ def test_the_matching_overlays_are_what_the_tool_gives(name, capsys):
     assert set(found) == set(given) == {'/**'}
 
 
+def test_a_file_is_matched_as_its_scenario_is(capsys):
+    path = str(PARAMS / 'figure_of_eight.csv')
+    assert match.run([path]) == 0
+    fundamental = yaml.safe_load(capsys.readouterr().out)['/**']['ros__parameters'][
+        'internal_model'
+    ]
+    given = from_yaml(ReferenceParameters, 'reference', PARAMS / 'scenario_file.yaml')
+    period = course(replace(given, {'file.path': path})).period
+    assert fundamental == {'fundamental': 2.0 * math.pi / period}
+
+
 def test_each_axis_has_its_own_loop():
     reference, _ = tables('scenario_circle')
     quick, _ = tables('scenario_circle', x__learning=30.0)
@@ -202,8 +213,9 @@ def test_the_ellipse_is_held():
 
 
 def test_a_frequency_that_is_not_held_is_named_with_the_error():
-    found = warnings(tables('scenario_circle')[0])
+    *found, offer = warnings(tables('scenario_circle')[0])
     assert len(found) == 2
+    assert 'ros2 run maglev_reference match' in offer
     assert found[0].startswith('the internal model of x does not hold 5 rad/s: expected error 1.')
     assert found[0].endswith('um rms')
     assert ' of z ' in found[1]
@@ -258,4 +270,4 @@ def test_every_trajectory_has_its_scenario():
     found = {
         read_yaml(path, 'reference').get('trajectory') for path in PARAMS.glob('scenario_*.yaml')
     }
-    assert found >= set(TRAJECTORIES) - {'hold'}
+    assert found >= set(TRAJECTORIES)

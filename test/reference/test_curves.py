@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from maglev_model.parameters import ParameterError, build
 from maglev_model.quintic import minimum_jerk_time
+from maglev_reference.accuracy import warnings
 from maglev_reference.curves import Chirp, Helix, Sinusoids, Square
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.trajectories import course
@@ -25,6 +26,14 @@ from maglev_reference.waypoints import Waypoints
 
 HOME = np.array([0.025, 0.004, -0.003, 0.0005, -0.001])
 SAMPLE = 1e-3
+OMEGA = 1.7  # of the internal models [rad/s]
+OWN = {
+    'sinusoids': {f'sinusoids.{axis}.frequency': (2.0 * OMEGA,) for axis in ('y', 'x', 'theta')},
+    'circle': {'circle.frequency': 2.0 * OMEGA},
+    'helix': {'helix.frequency': 2.0 * OMEGA},
+    'lissajous': {'lissajous.fundamental': 2.0 * OMEGA},
+}
+"""The same trajectories at twice that frequency, by themselves."""
 
 
 def assert_derivatives(motion, time):
@@ -44,7 +53,7 @@ def grid(start, end, seed=0):
 @given(st.floats(0.001, 0.05), st.floats(0.1, 30.0))
 @settings(max_examples=20, deadline=None)
 def test_a_circle_is_round_and_closes(radius, frequency):
-    circle = Sinusoids.circle(CircleParameters(radius=radius, frequency=frequency), HOME)
+    circle = Sinusoids.circle(CircleParameters(radius=radius, frequency=frequency), HOME, OMEGA)
     time = np.linspace(-1.0, 5.0, 300)
     found = circle.evaluate(time)
     away = found.position - HOME
@@ -65,7 +74,9 @@ def test_a_circle_is_round_and_closes(radius, frequency):
 )
 @settings(max_examples=25, deadline=None)
 def test_a_helix_lies_on_its_cone(radius, gap, turns, frequency):
-    helix = Helix(HelixParameters(radius=radius, gap=gap, turns=turns, frequency=frequency), HOME)
+    helix = Helix(
+        HelixParameters(radius=radius, gap=gap, turns=turns, frequency=frequency), HOME, OMEGA
+    )
     assert helix.period == pytest.approx(2.0 * turns * 2.0 * math.pi / frequency)
     time = grid(-0.5 * helix.period, 1.5 * helix.period)
     found = helix.evaluate(time)
@@ -81,7 +92,7 @@ def test_a_helix_lies_on_its_cone(radius, gap, turns, frequency):
 
 
 def test_a_helix_rises_evenly_between_its_ends():
-    helix = Helix(HelixParameters(turns=4, frequency=5.0), HOME)
+    helix = Helix(HelixParameters(turns=4, frequency=5.0), HOME, OMEGA)
     turn = 2.0 * math.pi / 5.0
     found = helix.evaluate(np.linspace(0.26 * turn, 3.74 * turn, 200))
     assert found.velocity[:, 0] == pytest.approx(found.velocity[0, 0], rel=1e-12)
@@ -145,11 +156,27 @@ def test_a_lissajous_figure_keeps_its_ratios():
         phase=(0.1, 0.2, 0.3, 0.0, 0.5),
     )
     time = np.linspace(0.0, 7.0, 100)
-    found = Sinusoids.lissajous(parameters, HOME).evaluate(time).position - HOME
+    found = Sinusoids.lissajous(parameters, HOME, OMEGA).evaluate(time).position - HOME
     for axis, order in ((0, 1), (1, 2), (2, 3), (4, 5)):
         wanted = parameters.amplitude[axis] * np.sin(2.0 * order * time + parameters.phase[axis])
         assert found[:, axis] == pytest.approx(wanted, abs=1e-15)
     assert not found[:, 3].any()
+
+
+@pytest.mark.parametrize('trajectory', ['sinusoids', 'circle', 'helix', 'lissajous'])
+def test_a_frequency_that_is_given_once_is_flown_and_held(trajectory):
+    """Without a frequency of its own a course follows the internal models, and they it."""
+    values = {'trajectory': trajectory, 'lissajous.fundamental': 0.0, 'helix.turns': 1}
+    values |= {f'sinusoids.{axis}.amplitude': (1e-3,) for axis in ('y', 'x', 'theta')}
+    table = build(ReferenceParameters, {**values, 'internal_model.fundamental': OMEGA})
+    period = course(table).period
+    assert period == pytest.approx(2.0 * math.pi / OMEGA * (2.0 if trajectory == 'helix' else 1.0))
+    own = build(ReferenceParameters, {**values, **OWN[trajectory]})
+    assert course(own).period == pytest.approx(0.5 * period)
+    if trajectory != 'helix':  # whose gap goes at half the frequency
+        assert warnings(table) == []
+        assert 'does not hold' in warnings(own)[0]
+        assert warnings(own)[-1].startswith('internal models to match')
 
 
 points = st.lists(

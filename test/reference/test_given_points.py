@@ -11,7 +11,7 @@ from maglev_model.modes import Mode
 from maglev_model.parameters import build
 from maglev_model.phases import Phase
 from maglev_reference.check import UnreachableError
-from maglev_reference.given_points import Candidate, Point, Through
+from maglev_reference.given_points import Candidate, Point, Through, step
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.run import ReferenceRun
 
@@ -115,6 +115,31 @@ def test_it_is_checked_as_any_reference_is(point: Point, why: str) -> None:
     with pytest.raises(UnreachableError, match=why):
         checked(through(point))
     assert checked(through(Point(3.0, (0.03,)))) == 3
+
+
+def test_a_step_is_a_shaped_one() -> None:
+    """As steps.* and limits.* say: 0.2 s, and longer where the acceleration would be too large."""
+    motion = step('theta', -0.002, HOVER, PARAMETERS)
+    assert motion.length == 0.2
+    end = motion.evaluate(np.array([0.2])).position[0]
+    np.testing.assert_allclose(end, [0.025, 0.0, 0.0, 0.0, -0.002], atol=1e-15)
+    longer = step('x', 0.05, HOVER, PARAMETERS)
+    assert longer.length == pytest.approx(math.sqrt(10.0 / math.sqrt(3.0) * 0.05 / 5.5))
+    assert checked(longer) == 1
+
+
+@pytest.mark.parametrize(
+    ('axis', 'distance', 'why'),
+    [
+        ('w', 0.001, "there is no axis 'w'"),
+        ('y', -0.0101, r'y shall step by -0\.0101 m, it may by 0\.01 m \(limits\.step\)'),
+        ('phi', math.nan, 'phi shall step by nan rad'),
+        ('y', -0.008, r'y is 0\.017\d+ m at 0\.\d+ s, it must lie in'),
+    ],
+)
+def test_a_step_that_is_refused(axis: str, distance: float, why: str) -> None:
+    with pytest.raises(UnreachableError, match=why):
+        checked(step(axis, distance, HOVER, PARAMETERS))
 
 
 def hovering(lead: int = 64) -> ReferenceRun:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 from graph import Process
 from ros2_command import Ros2
 
@@ -72,6 +74,13 @@ def test_echo(ros2: Ros2, small: Process) -> None:
     assert field == '[0.03 0.03 0.03 0.03]\n---\n'
     csv = ros2('topic', 'echo', '--once', '--csv', '--field', 'header', '/stage/measurement').out
     assert csv == '0,0,stage\n'
+
+
+def test_the_wait_is_over_when_what_is_asked_for_is_there(ros2: Ros2, small: Process) -> None:
+    start = time.monotonic()
+    for words in (('type',), ('echo', '--once', '--field', 'x')):
+        assert ros2('topic', *words, '--spin-time', '60', '/stage/measurement').code == 0
+    assert time.monotonic() - start < 30.0
 
 
 def test_echo_of_what_was_said_before(ros2: Ros2, small: Process) -> None:

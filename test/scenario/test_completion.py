@@ -1,8 +1,13 @@
-"""What bash offers behind the scripts: their options, the values of these, files."""
+"""What bash and zsh offer behind the scripts: their options, the values of these, files."""
 
 from __future__ import annotations
 
+import os
+import pty
+import select
+import shutil
 import subprocess
+import time
 from pathlib import Path
 
 import pytest
@@ -40,6 +45,38 @@ def test_values() -> None:
 
 def test_options_with_a_dash_within() -> None:
     assert offered('./scenarios/ellipse.sh', '--no') == {'--no-view'}
+
+
+@pytest.mark.skipif(not shutil.which('zsh'), reason='this machine has no zsh')
+def test_zsh_completes_as_bash_does(tmp_path: Path) -> None:
+    (tmp_path / '.zshrc').write_text(
+        f"PS1='ready> '\nautoload -Uz compinit && compinit -u -d {tmp_path}/dump\n"
+        'autoload -U +X bashcompinit && bashcompinit\n'
+        f'. {ROOT}/scenarios/complete.bash\n'
+    )
+    terminal, other = pty.openpty()
+    zsh = subprocess.Popen(
+        ['zsh', '-i'],
+        cwd=ROOT,
+        env={**os.environ, 'ZDOTDIR': str(tmp_path), 'TERM': 'xterm'},
+        stdin=other,
+        stdout=other,
+        stderr=other,
+        start_new_session=True,
+    )
+    try:
+        for typed, shown in (('', 'ready> '), ('./scenarios/ellipse.sh --no\t', '--no-view')):
+            os.write(terminal, typed.encode())
+            deadline, seen = time.monotonic() + 20.0, ''
+            while shown not in seen:
+                assert time.monotonic() < deadline, seen
+                if select.select([terminal], [], [], 0.1)[0]:
+                    seen += os.read(terminal, 4096).decode(errors='replace')
+    finally:
+        zsh.kill()
+        zsh.wait()
+        os.close(terminal)
+        os.close(other)
 
 
 def test_trajectories_come_first() -> None:

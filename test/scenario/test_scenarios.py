@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import contextlib
+import html
 import json
 import os
 import signal
@@ -11,8 +13,10 @@ import time
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
+import zstandard
 from bokeh.resources import Resources
 from page_client import PageClient
 from rosbags.rosbag2 import Reader
@@ -42,11 +46,17 @@ def run(scenario: str, out: Path, *options: str) -> subprocess.CompletedProcess[
 
 
 def soon(folder: Path) -> str:
-    """A parameter file with which what is measured begins early, and lands soon after."""
+    """A parameter file with which what is measured begins early, and lands soon after.
+
+    So soon, and in real time, the law need not be better than the paper's.
+    """
     chosen = folder / 'soon.yaml'
+    mean = [57e-6, 94e-6, 93e-6, 150e-6, 150e-6]
     chosen.write_text(
-        'reference: {ros__parameters: {run_in: 1.0, move_time: 0.5,'
-        ' lift_off: {time: 1.0, settle: 0.2}, landing: {time: 1.0, crawl_distance: 1.0e-4}}}\n'
+        'reference: {ros__parameters: {run_in: 1.0, move_time: 0.4,'
+        ' lift_off: {time: 0.5, settle: 0.0}, landing: {time: 0.5, crawl_distance: 1.0e-4}}}\n'
+        f'monitor: {{ros__parameters: {{limits: {{max_mean_error: {mean},'
+        f' max_error: [-1.0, -1.0, -1.0, -1.0, -1.0]}}}}}}\n'
     )
     return str(chosen)
 
@@ -73,6 +83,15 @@ def recorded(out: Path, topic: str, *fields: str) -> np.ndarray:
                 row.extend(np.atleast_1d(getattr(message, field)))
             rows[message.sequence] = row
     return np.array([rows[sequence] for sequence in sorted(rows)])
+
+
+def played(page: str) -> dict[str, Any]:
+    """What the page of a flight in 3D plays: times and messages, without their arrays."""
+    encoded = page.partition('__VISER_EMBED_DATA__="')[2].partition('"')[0]
+    data = zstandard.ZstdDecompressor().decompressobj().decompress(base64.b64decode(encoded)[8:])
+    size = int.from_bytes(data[:8], 'little')
+    found: dict[str, Any] = msgspec.msgpack.decode(data[8 : 8 + size])
+    return found
 
 
 def marked_processes(mark: str) -> list[str]:
@@ -107,7 +126,7 @@ def look_and_kill(out: Path) -> None:
 def alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a run that nothing else disturbed, and that has passed."""
     folder = tmp_path_factory.mktemp('alone')
-    done = run('ellipse_4dof', folder / 'run', '--duration', '2', '--params', soon(folder))
+    done = run('ellipse_4dof', folder / 'run', '--duration', '1', '--params', soon(folder))
     assert done.returncode == 0
     assert 'verdict: pass' in done.stdout
     return folder / 'run'
@@ -115,7 +134,7 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_ellipse_leaves_a_run(alone: Path) -> None:
     figures = metrics(alone)
-    assert figures['samples'] == 2000
+    assert figures['samples'] == 1000
     assert figures['missing_samples'] == 0
     assert figures['error_source'] == 'true'
     for axis in ('y', 'x', 'z'):
@@ -127,6 +146,23 @@ def test_ellipse_leaves_a_run(alone: Path) -> None:
     library = Resources(mode='inline', components=['bokeh']).render_js()
     assert library in report
     assert 'http' not in report.replace(library, ''), 'the report needs a network'
+    assert "the paper's machine: mean |e|</th>" in html.unescape(report)
+    assert '<td>123.9 µrad</td>' in report
+    assert 'Flown by ellipse_4dof.sh --out' in report
+    assert '<a href="replay.html">' in report
+
+
+def test_a_flight_can_be_seen_again(alone: Path) -> None:
+    page = (alone / 'replay.html').read_text()
+    assert len(page) < 2_000_000
+    recording = played(page)
+    stage_time = max(recorded(alone, '/stage/measurement')[:, 0]) * 1e-3
+    assert 0.8 * stage_time < recording['durationSeconds'] <= stage_time  # from the lift-off
+    moved = [m for _, m in recording['messages'] if m['type'] == 'SetPositionMessage']
+    heights = [m['position'][2] for m in moved if m['name'] == '/stage_link/platen_link']
+    assert heights[0] == pytest.approx(-0.031, abs=2e-5)
+    assert max(heights) > -0.0215
+    assert heights[-1] == pytest.approx(-0.031, abs=1e-4)
 
 
 def test_in_lockstep_all_of_a_bag_is_in_stage_time(alone: Path) -> None:
@@ -143,7 +179,7 @@ def test_in_lockstep_all_of_a_bag_is_in_stage_time(alone: Path) -> None:
 def test_two_stages_fly_on_one_domain_at_once_as_each_does_alone_and_unseen(
     alone: Path, tmp_path: Path
 ) -> None:
-    options = ('--duration', '2', '--params', soon(tmp_path))
+    options = ('--duration', '1', '--params', soon(tmp_path))
     strict = tmp_path / 'strict.yaml'
     limits = 'limits: {max_mean_error: [1.0e-9, -1.0, -1.0, -1.0, -1.0]}'
     strict.write_text(f'monitor: {{ros__parameters: {{{limits}}}}}')
@@ -207,6 +243,7 @@ def test_the_paper_on_its_own_model(tmp_path: Path) -> None:
 
 
 @pytest.mark.alone
+@pytest.mark.real_time
 def test_real_time_with_everything_running(tmp_path: Path) -> None:
     options = ('--mode', 'realtime', '--duration', '3', '--params', soon(tmp_path))
     done = run('ellipse', tmp_path / 'run', *options)
@@ -226,7 +263,9 @@ def test_a_reference_out_of_range_is_refused_before_anything_moves(tmp_path: Pat
     assert not len(recorded(tmp_path / 'run', '/reference', 'position'))
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize(
+    'number', [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long), signal.SIGKILL]
+)
 def test_however_it_is_ended_nothing_stays(tmp_path: Path, number: signal.Signals) -> None:
     out, mark = tmp_path / 'run', str(tmp_path)
     with (tmp_path / 'log').open('wb') as log:
@@ -253,4 +292,4 @@ def test_however_it_is_ended_nothing_stays(tmp_path: Path, number: signal.Signal
     while marked_processes(mark):
         assert time.monotonic() < deadline, marked_processes(mark)
         time.sleep(0.1)
-    assert len(recorded(out, '/stage/measurement', 'x')) > 2000
+    assert len(recorded(out, '/stage/measurement', 'x')) > 1500

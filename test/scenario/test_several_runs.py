@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import signal
 import time
 from pathlib import Path
@@ -9,13 +10,18 @@ from pathlib import Path
 import pytest
 from stand_ins import Tree
 
+from runner.commands import COMMANDS, main
+from runner.options import WrongUseError
+from runner.overlays import PARAMS, check_overlay
+from runner.programs import HEARD_BY_COMPARE, HEARD_BY_ROBUSTNESS
+
 
 @pytest.fixture
 def papers(tree: Tree) -> Tree:
     """A tree with all that the paper's tables ask for."""
     for name in ('steps', 'ellipse_4dof'):
         tree.parameters(f'params/scenario_{name}.yaml')
-    for name in ('benchmark', 'paper', 'paper_exact'):
+    for name in ('benchmark', 'paper', 'paper_exact', 'paper_shaped', 'rough'):
         tree.parameters(f'params/{name}.yaml')
     return tree
 
@@ -36,10 +42,21 @@ def flown(tree: Tree) -> list[str]:
 
 
 ALL_RUNS = [
-    f'{controller}/{scenario}'
-    for controller in ('paper', 'ours')
-    for scenario in ('steps', 'ellipse', 'ellipse_4dof')
+    *(
+        f'{law}/{name}'
+        for law in ('paper', 'ours')
+        for name in ('steps', 'ellipse', 'ellipse_4dof')
+    ),
+    *('paper_rough/ellipse', 'paper_rough/ellipse_4dof'),
+    *('ours_rough/steps', 'ours_rough/ellipse', 'ours_rough/ellipse_4dof', 'paper_shaped/steps'),
 ]
+OVERLAYS = {
+    'paper': ['paper.yaml', 'paper_exact.yaml'],
+    'ours': [],
+    'paper_rough': ['rough.yaml', 'paper.yaml', 'paper_exact.yaml'],
+    'ours_rough': ['rough.yaml'],
+    'paper_shaped': ['paper.yaml', 'paper_exact.yaml', 'paper_shaped.yaml'],
+}
 
 
 def test_all_runs_then_the_page(papers: Tree) -> None:
@@ -51,8 +68,8 @@ def test_all_runs_then_the_page(papers: Tree) -> None:
         assert 'mode:=realtime' in words
         assert 'duration:=' not in line
         files = [Path(word).name for word in words if word.endswith('.yaml') and ':=' not in word]
-        law = ['paper.yaml', 'paper_exact.yaml'] if run.startswith('paper/') else []
-        assert files == [f'scenario_{run.split("/")[1]}.yaml', 'benchmark.yaml', *law]
+        case, scenario = run.split('/')
+        assert files == [f'scenario_{scenario}.yaml', 'benchmark.yaml', *OVERLAYS[case]]
     assert papers.history('paper_tables') == [str(papers.out)]
     assert (papers.out / 'ours' / 'ellipse_4dof' / 'report.html').exists()
 
@@ -60,7 +77,7 @@ def test_all_runs_then_the_page(papers: Tree) -> None:
 def test_all_runs_are_in_the_namespace(papers: Tree) -> None:
     code, output = tables(papers, '--namespace', 'lab')
     assert code == 0, output
-    assert [line.count('-r __ns:=/lab ') for line in papers.history('reference')] == [1] * 6
+    assert [line.count('-r __ns:=/lab ') for line in papers.history('reference')] == [1] * 12
 
 
 def test_quick_runs_are_short(papers: Tree) -> None:
@@ -71,9 +88,14 @@ def test_quick_runs_are_short(papers: Tree) -> None:
 
 def test_a_run_that_fails_does_not_stop_the_others(papers: Tree) -> None:
     papers.behave('monitor@ellipse', '1')
-    code, output = tables(papers)
+    code, output = tables(papers, '--json')
+    failed = [run for run in ALL_RUNS if run.endswith('/ellipse')]
     assert code == 1
-    assert output.splitlines()[-1] == 'paper_tables: FAILED: paper/ellipse ours/ellipse'
+    assert output.splitlines()[-1] == f'paper_tables: FAILED: {" ".join(failed)}'
+    (outcome,) = (json.loads(line) for line in output.splitlines() if line.startswith('{'))
+    assert outcome['passed'] is False
+    assert [run['passed'] for run in outcome['runs']] == [run not in failed for run in ALL_RUNS]
+    assert outcome['page'] == str(papers.out / 'paper_tables.html')
     assert flown(papers) == ALL_RUNS
     assert len(papers.history('paper_tables')) == 1
 
@@ -148,6 +170,16 @@ def test_help_names_every_option(tree: Tree, script: str, options: tuple[str, ..
     assert not tree.history(script)
 
 
+@pytest.mark.parametrize('script', sorted(COMMANDS))
+def test_every_script_can_be_quiet_and_talk_to_programs(
+    script: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([script, '--help']) == 0
+    usage = capsys.readouterr().out
+    assert '\n  --quiet ' in usage
+    assert '\n  --json ' in usage
+
+
 @pytest.mark.parametrize(('verdict', 'parts'), [('0', ['steps', 'sinusoids']), ('1', ['steps'])])
 def test_the_single_motor_flies_its_second_part_when_the_first_passed(
     tree: Tree, verdict: str, parts: list[str]
@@ -190,6 +222,47 @@ def test_the_comparison_refuses_parameters_of_nodes_that_it_has_not(tree: Tree) 
     assert code == 2
     assert "parameters for 'reference', which is no node here: controller, plant, **" in output
     assert not tree.history('compare')
+
+
+@pytest.mark.parametrize('heard', [HEARD_BY_COMPARE, HEARD_BY_ROBUSTNESS])
+def test_the_rough_plant_is_an_overlay_of_every_study(heard: tuple[str, ...]) -> None:
+    check_overlay(str(PARAMS / 'rough.yaml'), sections=heard)
+
+
+def test_an_overlay_may_speak_to_others_too_but_not_to_none(tree: Tree) -> None:
+    both, only = tree.parameters('both.yaml', 'plant'), tree.parameters('only.yaml', 'robustness')
+    both.write_text(both.read_text() + only.read_text())
+    check_overlay(str(both))
+    check_overlay(str(only), sections=HEARD_BY_ROBUSTNESS)
+    with pytest.raises(WrongUseError, match="parameters for 'robustness', which is no node here"):
+        check_overlay(str(only))
+
+
+def test_the_fault_campaign_is_told_what_the_user_wants(tree: Tree) -> None:
+    tree.behave('faults', '1')
+    assert tree.finish('--runs', '40', '--double', '--out', 'here', script='faults') == (1, '')
+    assert tree.history('faults') == ['--out here --runs 40 --double']
+
+
+def test_the_drawn_machines_are_told_what_the_user_wants(tree: Tree) -> None:
+    options = ('--machines=4', '--law', 'paper', 'default', '--out', 'here')
+    assert tree.finish(*options, '--params', 'soft', script='robustness') == (0, '')
+    params = tree.path / 'params'
+    assert tree.history('robustness') == [
+        f'--params {params} --out here --machines 4 --law paper default'
+        f' --overlay {params}/soft.yaml'
+    ]
+
+
+def test_the_tuning_is_told_what_the_user_wants(tree: Tree) -> None:
+    options = ('--machines', '9', '--margin=5.5', '--experiment', 'hold', 'scan', '--out', 'here')
+    tree.behave('tune', '1')
+    assert tree.finish(*options, '--params', 'soft', script='tune') == (1, '')
+    params = tree.path / 'params'
+    assert tree.history('tune') == [
+        f'--params {params} --out here --experiment hold scan --machines 9 --margin 5.5'
+        f' --overlay {params}/soft.yaml'
+    ]
 
 
 def test_the_commissioning_gets_the_parameters_of_a_flight(tree: Tree) -> None:

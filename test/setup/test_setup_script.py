@@ -56,10 +56,10 @@ class Machine:
             ' sys.argv = sys.argv[1:]; runpy.run_path(sys.argv[0], run_name=\'__main__\')" "$@"',
         )
 
-    def setup(self, **variables: str) -> tuple[int, list[str]]:
+    def setup(self, shell: str = 'bash', **variables: str) -> tuple[int, list[str]]:
         """Source setup.sh and return the exit code and the lines it says."""
         result = subprocess.run(
-            ['/bin/bash', '-c', 'set -eu; . "$0"', self.root / 'setup.sh'],
+            [shutil.which(shell) or shell, '-c', 'set -eu; . "$0"', self.root / 'setup.sh'],
             env={'HOME': str(self.root), 'PATH': str(self.bin), **variables},
             capture_output=True,
             text=True,
@@ -87,6 +87,39 @@ needs_wheels = pytest.mark.skipif(
 @pytest.fixture
 def machine(tmp_path: Path) -> Machine:
     return Machine(tmp_path)
+
+
+needs_zsh = pytest.mark.skipif(not shutil.which('zsh'), reason='this machine has no zsh')
+
+
+@needs_zsh
+def test_zsh_is_taken_as_bash_is(machine: Machine) -> None:
+    assert machine.setup('zsh', ROS_DISTRO='humble') == machine.setup(ROS_DISTRO='humble')
+
+
+@pytest.mark.parametrize('shell', ['bash', pytest.param('zsh', marks=needs_zsh)])
+def test_the_environment_is_the_same_in_every_shell_and_when_it_is_entered_again(
+    shell: str,
+) -> None:
+    entered = f'. "{ROOT}/install/environment.bash"'
+    asked = 'PATH PYTHONPATH LD_LIBRARY_PATH AMENT_PREFIX_PATH NUMBA_CACHE_DIR ROS_DISTRO'
+    said = [
+        subprocess.run(
+            [*command, f'{entered}; {again}; for name in {asked}; do printenv $name; done'],
+            env={'HOME': '/', 'PATH': f'/usr/bin:{ROOT}/.venv/bin:/bin', 'PYTHONPATH': '/mine'},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        for command, again in (
+            ([shutil.which(shell) or shell, '-euc'], 'true'),
+            (['bash', '-euc'], entered),
+        )
+    ]
+    assert said[0].stdout == said[1].stdout
+    assert said[0].stdout.splitlines()[0].startswith(f'{ROOT}/.venv/bin:')
+    assert said[0].stdout.splitlines()[1].endswith(':/mine')
+    assert [each.stderr for each in said] == ['', '']
 
 
 def test_another_ros_is_sourced(machine: Machine) -> None:

@@ -44,6 +44,18 @@ def test_the_approaches_come_in_the_papers_order() -> None:
         find_contestants(PARAMS, ['ours'])
 
 
+def test_a_law_may_be_a_file_that_lies_anywhere(tmp_path: Path) -> None:
+    path = tmp_path / 'mine.yaml'
+    path.write_text('controller: {ros__parameters: {y: {bandwidth: 150.0}}}\n')
+    found = find_contestants(PARAMS, ['default', str(path)])
+    assert {one.name: one.controller.y.bandwidth for one in found} == {
+        'default': 200.0,
+        'mine': 150.0,
+    }
+    with pytest.raises(ParameterError, match='cannot read'):
+        find_contestants(PARAMS, [str(tmp_path / 'none.yaml')])
+
+
 def test_an_overlay_lies_over_every_law(tmp_path: Path) -> None:
     """Its machine is the law's and the stage's; the last one wins; others' sections are theirs."""
     over, last = tmp_path / 'over.yaml', tmp_path / 'last.yaml'
@@ -162,8 +174,9 @@ def test_the_whole_command(
     monkeypatch.setattr(experiments, 'SHAPED_STEPS', ())
     out = tmp_path / 'a' / 'b'
     options = ['--params', str(PARAMS), '--out', str(out), '--quick', '--laws']
-    assert compare([*options, 'default', 'regulator_3dof']) == 0
-    printed = capsys.readouterr().out
+    assert compare([*options, 'default', 'regulator_3dof', '--json']) == 0
+    captured = capsys.readouterr()
+    printed, outcome = captured.err, json.loads(captured.out)
     assert 'without ROS' in printed
     text = (out / 'comparison.txt').read_text()
     assert text in printed
@@ -171,10 +184,9 @@ def test_the_whole_command(
     assert '13.5 %' in line
     assert '0.1 %' in line
     assert (out / 'regions.png').read_bytes()[:4] == b'\x89PNG'
-    assert set(json.loads((out / 'comparison.json').read_text())['regions']) == {
-        'default',
-        'regulator_3dof',
-    }
+    found = json.loads((out / 'comparison.json').read_text())
+    assert set(found['regions']) == {'default', 'regulator_3dof'}
+    assert outcome == {'passed': True, 'out': str(out), 'comparison': found}
 
 
 @pytest.mark.parametrize(

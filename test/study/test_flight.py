@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from maglev_model.axes import AXES, THETA, Y
+from maglev_model.axes import AXES, THETA, X, Y, Z
 from maglev_model.parameters import ParameterError, read_yaml, replace
 from maglev_model.phases import Phase
 from maglev_reference.parameters import ReferenceParameters
@@ -50,6 +50,15 @@ def test_steps_are_measured() -> None:
     flown = fly('steps', duration=1.0)
     assert set(flown.phase[flown.measured]) == {Phase.STEP}
     assert flown.reference.position[flown.measured][-1, Y] == pytest.approx(0.027)
+
+
+def test_a_frequency_is_given_once() -> None:
+    """To the controller's internal models, and what is flown follows them."""
+    once = {'internal_model.fundamental': 6.0}
+    flown = fly('circle', duration=0.5, controller=once, reference={'run_in': 0.0})
+    velocity = flown.reference.velocity[flown.measured]
+    assert np.hypot(velocity[:, X], velocity[:, Z]) == pytest.approx(0.03 * 6.0)
+    assert flown.mean_error['x'] < 1e-5
 
 
 def test_files_and_names(tmp_path: Path) -> None:

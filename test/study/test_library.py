@@ -67,6 +67,16 @@ def test_simulate_runs_the_plant_under_a_function() -> None:
             TypeError,
             r"'plant' is a dict, it takes PlantParameters: maglev_model\.parameters\.build\(Plant",
         ),
+        (
+            lambda: maglev.simulate({'seed': 1}, 1.0),  # type: ignore[arg-type]
+            TypeError,
+            "'law' is a dict, it takes a function of the encoders' reading",
+        ),
+        (
+            lambda: maglev.fly({'trajectory': 'ellipse'}),  # type: ignore[arg-type]
+            TypeError,
+            "'trajectory' is a dict, it takes a name such as 'ellipse'",
+        ),
         (lambda: maglev.simulate(print, math.nan), ValueError, "'duration' is nan s"),
         (
             lambda: maglev.fly('ellipse', plant=maglev.ControllerParameters()),  # type: ignore[arg-type]

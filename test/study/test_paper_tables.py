@@ -11,10 +11,10 @@ from typing import Any
 
 import pytest
 
+from maglev_model.paper import SCENARIOS, STEPS, TRACKING
 from maglev_monitor.bag.analysis import analyse
 from maglev_study import paper_plots, paper_tables
-from maglev_study.paper import SCENARIOS, STEPS, TRACKING
-from maglev_study.paper_tables import CONTROLLERS, HEADS, NOT_PASSED, NOTHING, PASS
+from maglev_study.paper_tables import CASES, COLUMNS, HEADS, NOT_PASSED, NOTHING, PASS
 
 MADE = [step for step in STEPS if (step.axis, step.target) in (('y', 0.027), ('theta', 0.01))]
 """The steps that the made-up run has."""
@@ -25,19 +25,23 @@ def result(bag: Path) -> dict[str, Any]:
     return analyse(bag).result
 
 
+def factor_of(case: str, scenario: str) -> float:
+    """What the figures of a made-up run are multiplied by."""
+    return 1.5 ** (1 + 3 * list(CASES).index(case) + SCENARIOS.index(scenario))
+
+
 @pytest.fixture
 def folder(tmp_path: Path, bag: Path, result: dict[str, Any]) -> Path:
-    """Six runs, their bags all the same one, their figures told apart by a factor."""
-    factor = 1.0
-    for controller in CONTROLLERS:
-        for scenario in SCENARIOS:
-            run = tmp_path / controller / scenario
+    """All runs, their bags all the same one, their figures told apart by a factor."""
+    for case, (_, scenarios) in CASES.items():
+        for scenario in scenarios:
+            run = tmp_path / case / scenario
             run.mkdir(parents=True)
             (run / 'bag').symlink_to(bag)
             own = copy.deepcopy(result)
-            own['axes']['x']['mean_abs_error'] *= factor
+            own['own_axes']['x']['mean_abs_error'] *= factor_of(case, scenario)
+            own['own_steps'][0]['settling_time'] *= factor_of(case, scenario)
             (run / 'metrics.json').write_text(json.dumps(own))
-            factor *= 1.5
     return tmp_path
 
 
@@ -88,25 +92,32 @@ def test_each_run_fills_its_own_cells(folder: Path, result: dict[str, Any]) -> N
     lines = (folder / 'page' / 'paper_tables.md').read_text(encoding='utf-8').splitlines()
     cells = [[cell.strip() for cell in re.split(r'(?<!\\)\|', line)[1:-1]] for line in lines]
     assert cells[0] == list(HEADS)
-    assert {len(row) for row in cells} == {4}
-    # Two head lines; for each ellipse a heading and five axes; a heading and the steps.
-    assert len(cells) == 2 + 6 * len(TRACKING) + 1 + len(MADE)
-    mean = 1e6 * result['axes']['x']['mean_abs_error']
-    x = [row for row in cells if row[0] == 'x']
-    assert x[0][1:] == ['78.33 µm', f'{1.5 * mean:.1f} µm', f'{1.5**4 * mean:.1f} µm']
-    assert x[1][1:] == ['77.98 µm', f'{1.5**2 * mean:.1f} µm', f'{1.5**5 * mean:.1f} µm']
-    theta = [row for row in cells if row[0] == 'theta']
-    assert [row[1] for row in theta] == ['–', '123.9 µrad']
-    y, theta = result['steps']
+    assert {len(row) for row in cells} == {2 + len(COLUMNS)}
+    # Two head lines; for each ellipse a heading and its axes; twice a heading and the steps.
+    assert len(cells) == 2 + (1 + 3) + (1 + 4) + 2 * (1 + len(MADE))
+    found = result['own_axes']['x']
+    mean, largest = 1e6 * found['mean_abs_error'], 1e6 * found['max_abs_error']
+    for published, scenario, row in zip(
+        ('78.33 µm', '77.98 µm'), TRACKING, (row for row in cells if row[0] == 'x'), strict=True
+    ):
+        shown = [f'{factor_of(case, scenario) * mean:.1f}, {largest:.1f} µm' for case in COLUMNS]
+        assert row[1:] == [published, *shown]
+    assert [row[1] for row in cells if row[0] == 'theta'] == ['123.9 µrad']
+    y, theta = result['own_steps']
     assert theta['encoder_time'] is None
-    for row, step in ((cells[-2], y), (cells[-1], theta)):
-        times = [
-            f'{step[key]:.2f} s' if step[key] else 'never'
-            for key in ('settling_time', 'encoder_time')
-        ]
-        assert row[2] == row[3] == f'{step["overshoot_percent"]:.1f} %, {times[0]}, {times[1]}'
-    assert cells[-2][:2] == ['y, 20 → 27 mm', '14.3 %, < 3 s, about 5 s']
-    assert cells[-1][:2] == ['theta, 0 → 10 mrad', '22 %, < 5 s, < 10 s']
+    raw, rounded = cells[-5], cells[-2]
+    assert raw[:2] == ['y, 20 → 27 mm', '14.3 %, < 3 s, about 5 s']
+    assert cells[-4][:2] == ['theta, 0 → 10 mrad', '22 %, < 5 s, < 10 s']
+    assert rounded[:2] == ['y, 20 → 27 mm', '']
+    for row, cases in (
+        (raw, ('paper', '', '', '')),
+        (rounded, ('paper_shaped', 'ours', '', 'ours_rough')),
+    ):
+        for cell, case in zip(row[2:], cases, strict=True):
+            settled = y['settling_time'] * factor_of(case, 'steps') if case else 0.0
+            words = f'{y["overshoot_percent"]:.1f} %, {settled:.2f} s, {y["encoder_time"]:.2f} s'
+            assert cell == (words if case else '')
+    assert cells[-1][2].endswith(' s, never')
     assert f'60 s, simulated over {result["duration"]:g} s' in cells[2][0]
 
 
@@ -125,7 +136,8 @@ def test_what_is_wrong_with_a_run_is_said_and_fails(folder: Path, bag: Path, cap
         line.removeprefix('paper_tables: ').split(': ', 1)
         for line in capsys.readouterr().err.splitlines()
     )
-    law, ours = CONTROLLERS.values()
+    law, ours, *_ = (name for name, _ in CASES.values())
+    others = [f'{CASES[case][0]}, steps' for case in ('ours_rough', 'paper_shaped')]
     expected = {
         f'{law}, steps': '5 of 7 steps are missing, first that of y to 25 mm',
         f'{ours}, steps': 'it has not finished',
@@ -134,22 +146,23 @@ def test_what_is_wrong_with_a_run_is_said_and_fails(folder: Path, bag: Path, cap
         f'{law}, ellipse_4dof': 'its metrics.json is damaged',
         f'{ours}, ellipse_4dof': 'recovered',
     }
-    assert problems.keys() == expected.keys()
+    assert problems.keys() == {*expected, *others}
     for run, words in expected.items():
         assert words in problems[run]
     page = (folder / 'paper_tables.html').read_text(encoding='utf-8')
     assert 'class="badge fail"' in page
-    assert '0 of 6 runs passed' in page
+    assert '4 of 12 runs passed' in page
 
 
 def test_a_run_that_tracked_nothing_is_no_ellipse(folder: Path) -> None:
     path = folder / 'ours' / 'ellipse' / 'metrics.json'
     found = json.loads(path.read_text())
-    found['axes'] = {axis: dict.fromkeys(row, None) for axis, row in found['axes'].items()}
+    for name in ('axes', 'own_axes'):
+        found[name] = {axis: dict.fromkeys(row, None) for axis, row in found[name].items()}
     path.write_text(json.dumps(found))
     run = paper_tables.load_run(folder, 'ours', 'ellipse')
     assert run.problem == 'it tracked nothing'
-    assert all(row[-1] == '–' for row in list(paper_tables.rows([run]))[1:6])
+    assert all(row[3] == '–' for row in list(paper_tables.rows([run]))[1:4])
 
 
 def test_no_run_at_all_is_one_line(tmp_path: Path, capsys: Any) -> None:

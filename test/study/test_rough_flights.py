@@ -9,13 +9,14 @@ from rough import PARAMS
 from maglev_controller.parameters import ControllerParameters
 from maglev_model.axes import X
 from maglev_model.parameters import from_yaml
+from maglev_monitor.metrics.repeatability import repeatability
 from maglev_study.references import HOVER, ellipse, held, scan
-from maglev_study.repeatability import repeatability
 from maglev_study.rough_flights import (
     Experiment,
     experiments,
     fly_rough,
     laws,
+    machines,
     plant_of,
     positioning,
 )
@@ -51,7 +52,8 @@ def test_the_three_positions_are_told_apart() -> None:
 
 
 def test_the_default_law_flies_the_rough_plant() -> None:
-    rough, law = plant_of(PARAMS, 'rough'), laws(PARAMS)['default law']
+    rough, law = plant_of(PARAMS, 'rough'), laws(PARAMS, 'rough')['default law']
+    assert law.input_delay == 1
     found = next(experiments(1e-3))
     short = Experiment(
         found.name, type(found.references)(*(a[:6000] for a in found.references)), 2.0
@@ -59,7 +61,21 @@ def test_the_default_law_flies_the_rough_plant() -> None:
     outcome = fly_rough(rough, law, short)
     assert not outcome.lost
     assert outcome.own is not None
-    assert np.all(outcome.own.mean < [2e-5, 2e-5, 2e-5, 5e-5, 5e-5])
+    assert np.all(outcome.own.mean < [4e-6, 4e-6, 4e-6, 15e-6, 15e-6])
+
+
+def test_machines_that_are_drawn_differ_and_are_the_same_again() -> None:
+    first, again = list(machines(PARAMS, 4)), list(machines(PARAMS, 4))
+    assert first == again
+    assert [plant.effects.friction.model for plant in first] == [
+        'lugre',
+        'coulomb',
+        'tanh',
+        'lugre',
+    ]
+    aside = [(plant.effects.balance.aside_x, plant.effects.balance.aside_z) for plant in first]
+    assert np.hypot(*np.array(aside).T) == pytest.approx(0.002)
+    assert len({*aside}) == len({plant.seed for plant in first}) == 4
 
 
 def test_a_platen_that_is_lost_is_said_to_be() -> None:

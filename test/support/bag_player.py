@@ -59,7 +59,8 @@ def information(bag: Path) -> dict[str, Any]:
     assert type(found['starting_time']['nanoseconds_since_epoch']) is int
     for text in ('compression_format', 'compression_mode'):  # chunks are the storage's own matter
         assert found[text] == ''
-    assert found['custom_data'] in (None, {})
+    for text in (found['custom_data'] or {}).items():
+        assert [type(word) for word in text] == [str, str]
     assert isinstance(found['ros_distro'], str)
     assert [bag / path for path in found['relative_file_paths']] == list(bag.glob('*.mcap'))
     assert [file['path'] for file in found['files']] == found['relative_file_paths']

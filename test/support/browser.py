@@ -71,6 +71,16 @@ class Browser:
         clip = {'x': 0, 'y': 0, 'width': width, 'height': height, 'scale': 1}
         return base64.b64decode(self._ask('Page.captureScreenshot', clip=clip)['data'])
 
+    def resize(self, width: int, height: int) -> None:
+        """Become a window of so many CSS pixels, as on a phone."""
+        size = {'width': width, 'height': height, 'deviceScaleFactor': 1, 'mobile': True}
+        self._ask('Emulation.setDeviceMetricsOverride', **size)
+
+    def darken(self) -> None:
+        """Prefer dark pages from now on."""
+        wish = {'name': 'prefers-color-scheme', 'value': 'dark'}
+        self._ask('Emulation.setEmulatedMedia', features=[wish])
+
     def close(self) -> None:
         """End the browser with all its processes."""
         self._socket.close()

@@ -1,4 +1,4 @@
-"""The controller's node, but that it fails as its first argument says from sample 2500 on."""
+"""The controller's node, but that it fails as its first argument says from sample 1200 on."""
 
 from __future__ import annotations
 
@@ -8,19 +8,29 @@ from typing import Any
 
 from maglev_controller import node, supervision
 from maglev_controller.node import ControllerNode
+from maglev_msgs.msg import Measurement
 
-FROM = 2500
+FROM = 1200
 
 
 class _Failing(ControllerNode):
-    """Fails in a callback beside the loop, once."""
+    """Fails once as it takes references, beside the loop or for a measurement that needs them."""
 
-    _has_failed = False
+    _has_failed = _in_loop = False
+
+    def _on_measurement(self, message: Measurement) -> None:
+        self._in_loop = True
+        super()._on_measurement(message)
+        self._in_loop = False
 
     def _take_references(self) -> None:
-        if sys.argv[1] == 'beside' and self._sequence >= FROM and not self._has_failed:
-            self._has_failed = True
-            raise RuntimeError('made to fail')
+        how = sys.argv[1]
+        if self._sequence >= FROM and not self._has_failed:
+            if how == ('in_loop' if self._in_loop else 'beside'):
+                self._has_failed = True
+                raise RuntimeError('made to fail')
+            if how == 'in_loop':
+                return  # so that they run out
         super()._take_references()
 
 

@@ -14,6 +14,11 @@ from maglev_node.topics import CURRENTS, MEASUREMENT, TRUE_STATE
 
 ELLIPSE = 'scenario_ellipse.yaml'
 LONG = 'duration:=200.0'
+BRISK = (
+    *('lift_off.time:=0.5', 'lift_off.settle:=0.0', 'move_time:=0.4'),
+    *('landing.time:=0.5', 'landing.crawl_distance:=1.0e-4'),
+)
+"""For the reference: up and down in a second where the default takes four."""
 WATCHED = 'watchers:=[observer]'  # by the test
 LOWER_STOP = 0.031
 
@@ -22,18 +27,19 @@ def starts(
     nodes: Nodes,
     *arguments: str,
     mode: str = 'lockstep',
-    answer_timeout: float = 5.0,
     plant: tuple[str, ...] = (),
     controller: tuple[str, ...] = (),
     watched: tuple[str, ...] = (WATCHED,),
 ) -> tuple[Callable[[], Process], ...]:
     """What starts plant, controller and reference on the ellipse; ``arguments`` are the last's."""
     common = f'mode:={mode}', *watched
-    patience = f'answer_timeout:={answer_timeout}'
     return (
-        partial(nodes.start, 'plant', *common, patience, *plant, params=('benchmark.yaml',)),
+        partial(nodes.start, 'plant', *common, *plant, params=('benchmark.yaml',)),
         partial(nodes.start, 'controller', *common, *controller),
-        partial(nodes.start, 'reference', *common, 'run_in:=1.0', *arguments, params=(ELLIPSE,)),
+        partial(
+            *(nodes.start, 'reference', *common, 'run_in:=1.0', *BRISK, *arguments),
+            params=(ELLIPSE,),
+        ),
     )
 
 

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import contextlib
+import multiprocessing
 import os
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import rclpy
 from ament_index_python.packages import get_package_prefix
+from forked import run_script
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.parameter import Parameter
+from rclpy.serialization import deserialize_message
 from rclpy.task import Future
 from std_srvs.srv import SetBool, Trigger
 
@@ -26,6 +30,10 @@ from maglev_node.topics import SAMPLE_TOPICS
 ROOT = Path(__file__).resolve().parents[2]
 PARAMS = ROOT / 'params'
 
+_IMPORTED_BY_NODES = (
+    *('maglev_plant.node', 'maglev_controller.node', 'maglev_reference.node'),
+    *('maglev_hw_bridge.node', 'maglev_monitor.live.node', 'maglev_monitor.bag.recorder'),
+)
 _MATCHING = 0.3  # in which a service has seen a new client, whose answer would else be lost [s]
 
 
@@ -35,49 +43,86 @@ def executable(package: str, name: str) -> str:
 
 
 class Process:
-    """One started node; its output is in ``log``."""
+    """One started command; its output is in ``log``."""
 
     def __init__(self, command: list[str], log: Path) -> None:
         self.log = log
-        with log.open('wb') as output:
-            self._process = subprocess.Popen(
+        self._process = self._start(command)
+        self.pid = self._process.pid
+
+    def _start(self, command: list[str]) -> Any:
+        with self.log.open('wb') as output:
+            return subprocess.Popen(
                 command, stdout=output, stderr=subprocess.STDOUT, start_new_session=True
             )
-        self.pid = self._process.pid
+
+    def _code(self, timeout: float) -> int | None:
+        """Exit code, negative for a signal; None when it has not ended by then."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            return int(self._process.wait(timeout))
+        return None
 
     def wait(self, timeout: float = 30.0) -> int:
         """Exit code, as a shell would give it."""
-        code = self._process.wait(timeout)
+        code = self._code(timeout)
+        assert code is not None, f'it did not end:\n{self.output}'
         return code if code >= 0 else 128 - code
 
     def signal(self, number: signal.Signals) -> None:
         """Send a signal to the process, if it still runs."""
-        if self._process.poll() is None:
-            self._process.send_signal(number)
+        if self.running:
+            os.kill(self.pid, number)
 
     @property
     def running(self) -> bool:
         """Whether the process has not ended."""
-        return self._process.poll() is None
+        return self._code(0.0) is None
 
     @property
     def output(self) -> str:
         """All it printed so far."""
         return self.log.read_text(errors='replace')
 
-    def wait_for(self, text: str, timeout: float = 30.0) -> None:
-        """Wait until it has printed a text; fails when it ends or time runs out before."""
+    def wait_for(self, text: str, timeout: float = 30.0, unless: str = '') -> None:
+        """Wait until it has printed a text; fails when it ends, is late or says ``unless``."""
         deadline = time.monotonic() + timeout
         while text not in self.output:
             assert self.running, f'ended before it said {text!r}:\n{self.output}'
             assert time.monotonic() < deadline, f'never said {text!r}:\n{self.output}'
+            assert not unless or unless not in self.output, self.output
             time.sleep(0.02)
 
     def kill(self) -> None:
         """End it at once, with everything it started."""
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(self.pid, signal.SIGKILL)
-        self._process.wait(10)
+        for kill, pid in ((os.killpg, self.pid), (os.kill, self.pid)):
+            with contextlib.suppress(ProcessLookupError):
+                kill(pid, signal.SIGKILL)
+        self._code(10.0)
+
+
+class ForkedProcess(Process):
+    """A Python script run in a copy of a process that has imported what all nodes do."""
+
+    def _start(self, command: list[str]) -> Any:
+        started = _forks().Process(
+            target=run_script, args=(command, dict(os.environ), os.getcwd(), str(self.log))
+        )
+        self.log.touch()
+        started.start()
+        return started
+
+    def _code(self, timeout: float) -> int | None:
+        self._process.join(timeout)
+        code: int | None = self._process.exitcode
+        return code
+
+
+@cache
+def _forks() -> Any:
+    """A server that starts processes; it has one thread, as what forks must."""
+    context = multiprocessing.get_context('forkserver')
+    context.set_forkserver_preload(list(_IMPORTED_BY_NODES))
+    return context
 
 
 class Nodes:
@@ -108,13 +153,39 @@ class Nodes:
             command += ['-p', argument]
         for rule in remap:
             command += ['-r', rule]
-        return self.run(name, command)
+        return self._add(Process if on else ForkedProcess, name, command)
 
     def run(self, name: str, command: list[str]) -> Process:
         """Start any command."""
-        process = Process(command, self.folder / f'{name}-{len(self.started)}.log')
+        return self._add(Process, name, command)
+
+    def _add(self, kind: type[Process], name: str, command: list[str]) -> Process:
+        process = kind(command, self.folder / f'{name}-{len(self.started)}.log')
         self.started.append(process)
         return process
+
+
+class Heard(Sequence[Any]):
+    """Messages of a topic as they came; each is decoded when somebody looks at it."""
+
+    def __init__(self, kind: type) -> None:
+        self._kind = kind
+        self._held: list[Any] = []
+
+    def add(self, taken: Iterable[bytes]) -> None:
+        """Keep more."""
+        self._held.extend(taken)
+
+    def __len__(self) -> int:
+        return len(self._held)
+
+    def __getitem__(self, index: Any) -> Any:
+        if isinstance(index, slice):
+            return [self[each] for each in range(*index.indices(len(self)))]
+        message = self._held[index]
+        if isinstance(message, bytes):
+            message = self._held[index] = deserialize_message(message, self._kind)
+        return message
 
 
 class Observer:
@@ -134,20 +205,20 @@ class Observer:
         self._executor = EventsExecutor(context=self._context)
         self._executor.add_node(self.node)
         self._subscriptions: dict[str, PolledSubscription] = {}
-        self.messages: dict[str, list[Any]] = {}
+        self.messages: dict[str, Heard] = {}
         self._clients: dict[str, Any] = {}
         self._heard: list[Any] = []
 
     def watch(self, *topics: str) -> None:
         """Keep the messages of these topics from now on."""
         for topic in topics:
-            self.messages[topic] = []
-            self._subscriptions[topic] = self.node.poll(topic, SAMPLE_TOPICS[topic])
+            self.messages[topic] = Heard(SAMPLE_TOPICS[topic])
+            self._subscriptions[topic] = self.node.poll(topic, SAMPLE_TOPICS[topic], raw=True)
 
-    def look(self) -> dict[str, list[Any]]:
+    def look(self) -> dict[str, Heard]:
         """All messages so far, by topic."""
         for topic, subscription in self._subscriptions.items():
-            self.messages[topic].extend(message for message, _ in subscription.take())
+            self.messages[topic].add(message for message, _ in subscription.take())
         return self.messages
 
     def newest(self, topic: str) -> Any:

@@ -78,15 +78,17 @@ def require(condition: bool, message: str) -> None:
 
 def check_buffer(name: str, buffer: Any, dtype: Any, n: int) -> None:
     require(isinstance(buffer, np.ndarray), f'{name} is no array')
-    require(buffer.dtype == dtype, f'{name} is {buffer.dtype}, it must be {np.dtype(dtype)}')
-    require(type(n) is int and buffer.shape == (n,), f'{name} has {buffer.shape} for n = {n}')
+    if buffer.dtype != dtype:
+        raise CallError(f'{name} is {buffer.dtype}, it must be {np.dtype(dtype)}')
+    require(type(n) is int and buffer.shape == (n,), f'{name} has another shape than n = {n}')
     require(buffer.flags.c_contiguous, f'{name} is not contiguous')
 
 
 def check_channels(channels: Any, n: int, number: int) -> None:
     check_buffer('channels', channels, np.uint32, n)
-    require(len(set(channels.tolist())) == n, f'channels repeat: {channels}')
-    require(all(channel < number for channel in channels), f'no such channel in {channels}')
+    numbers = channels.tolist()
+    if len(set(numbers)) < n or max(numbers, default=0) >= number:
+        raise CallError(f'channels repeat or are not there: {channels}')
 
 
 class _WrongError(Exception):

@@ -26,11 +26,15 @@ FORMER = {
     'ControllerState': 'std_msgs/Header header\nuint64 sequence\nuint8 mode\nbool saturated\n'
     'float64[5] position\nfloat64[5] error\nfloat64[5] error_rate\nfloat64[5] virtual_input\n'
     'float64[5] internal_model\n',
+    'PlantState': 'std_msgs/Header header\nuint64 sequence\nfloat64[10] state\n'
+    'float64[4] direct_current\nfloat64[4] quadrature_current\nfloat64[4] thermal_load\n',
 }
 """Messages that have grown since, as they were."""
 
 MESSAGES = Path(__file__).resolve().parents[2] / 'src' / 'maglev_msgs' / 'msg'
 RADIUS = 0.397
+OWN = 2e-6
+"""What the encoders' own scales have more than there is [m]."""
 SESSION = 2**63 + 1
 TOPICS = {
     'reference': ('/reference', 'maglev_msgs/msg/Reference'),
@@ -168,6 +172,7 @@ class Encoder:
                 run.direct[n],
                 run.quadrature[n],
                 np.full(4, 0.25),
+                *(() if self._former else (np.append(run.gap[n], run.position[n, 1:3]) + OWN,)),
             ),
         }
         header = self.header((run.stamp if self._former else run.stage_time)[n], frame_id)

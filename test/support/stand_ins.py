@@ -85,8 +85,9 @@ class Tree:
             package = 'maglev_monitor' if name == 'recorder' else f'maglev_{name}'
             self.executable(package, name, STAND_IN)
         self.executable('maglev_monitor', 'analyze', ANALYZE)
-        self.executable('maglev_study', 'paper_tables', PROGRAM)
-        self.executable('maglev_study', 'compare', PROGRAM)
+        self.executable('maglev_view', 'replay', PROGRAM)
+        for name in ('paper_tables', 'compare', 'faults', 'robustness', 'tune'):
+            self.executable('maglev_study', name, PROGRAM)
         self.executable('maglev_hw_bridge', 'commission', PROGRAM)
         self.behave('monitor', '0')
 

@@ -63,7 +63,7 @@ def test_every_button_has_its_services() -> None:
 
 
 def test_an_emergency_stop_is_the_controllers(graph: Graph) -> None:
-    graph.operator.ask('Emergency stop')
+    graph.operator.ask('Emergency stop', {})
     graph.services['/lab/controller/emergency_stop'].answer(True, 'landing')
     graph.operator.go_on()
     assert graph.called() == {'/lab/controller/emergency_stop'}
@@ -76,7 +76,7 @@ def test_where_the_controller_does_not_stop_the_stage_does(
 ) -> None:
     controller = graph.services['/lab/controller/emergency_stop']
     controller.ready = how != 'gone'
-    graph.operator.ask('Emergency stop')
+    graph.operator.ask('Emergency stop', {})
     if how == 'refused':
         controller.answer(False, 'it flies nothing')
     elif how == 'silent':
@@ -92,7 +92,7 @@ def test_where_the_controller_does_not_stop_the_stage_does(
 
 
 def test_a_reset_is_of_the_stage_and_then_of_the_controller(graph: Graph) -> None:
-    graph.operator.ask('Reset')
+    graph.operator.ask('Reset', {})
     assert graph.called() == {'/lab/plant/reset'}
     graph.services['/lab/plant/reset'].answer(True)
     graph.operator.go_on()
@@ -102,13 +102,22 @@ def test_a_reset_is_of_the_stage_and_then_of_the_controller(graph: Graph) -> Non
 
 
 def test_enable_enables(graph: Graph) -> None:
-    graph.operator.ask('Enable')
+    graph.operator.ask('Enable', {})
     assert graph.services['/lab/controller/enable'].request.data is True
+
+
+def test_a_step_is_of_the_axis_and_the_distance_that_were_chosen(graph: Graph) -> None:
+    graph.operator.ask('Step', {'axis': 'z', 'distance': -1e-4})
+    request = graph.services['/lab/reference/step'].request
+    assert (request.axis, request.distance) == ('z', -1e-4)
+    graph.services['/lab/reference/step'].answer(False, 'step refused: z is 0.06 m')
+    graph.operator.go_on()
+    assert graph.said[-1] == '/lab/reference/step: step refused: z is 0.06 m'
 
 
 def test_what_nobody_offers_is_said(graph: Graph) -> None:
     for service in graph.services.values():
         service.ready = False
-    graph.operator.ask('Lift off')
+    graph.operator.ask('Lift off', {})
     graph.operator.go_on()
     assert graph.said[-1] == f'nobody offers lift_off beside {REFERENCE}'

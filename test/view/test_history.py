@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from maglev_view.web.history import History
+from maglev_view.web.page import plotted
 
 BINS, WIDTH = 8, 5
 
@@ -58,3 +59,11 @@ def test_a_stage_that_begins_anew_begins_the_window_anew() -> None:
     assert sequence[-1] == 0
     assert np.isnan(low[:-1]).all()
     assert (low[-1], high[-1]) == (2.0, 2.0)
+
+
+def test_a_plot_begins_with_what_is_known() -> None:
+    low = np.array([[np.nan, np.nan], [np.nan, 1.0], [2.0, 3.0], [np.nan, np.nan], [4.0, 5.0]])
+    time, *curves = plotted(np.arange(5.0), low, low + 1.0)
+    np.testing.assert_array_equal(time, [2.0, 3.0, 4.0])
+    wanted = [[2.0, np.nan, 4.0], [3.0, np.nan, 5.0], [3.0, np.nan, 5.0], [4.0, np.nan, 6.0]]
+    np.testing.assert_array_equal(curves, wanted)

@@ -138,10 +138,18 @@ RECORDS: Final = np.dtype(
 sample came to. Python hands over one array faster than three."""
 
 MODEL: Final = np.dtype(
-    [('output', 'f8'), ('drive', 'f8'), ('antiwindup', 'f8'), ('oscillates', '?')], align=True
+    [
+        ('output', 'f8'),
+        ('drive', 'f8'),
+        ('antiwindup', 'f8'),
+        ('oscillates', '?'),
+        ('first', 'i8'),
+        ('end', 'i8'),
+    ],
+    align=True,
 )
-"""What belongs to one state of an internal model: elements of κ (Γ included), N_d and E_d, and
-whether it is an oscillator's that fades at rest."""
+"""What belongs to one state of an internal model: elements of κ (Γ included), N_d and E_d; whether
+it is an oscillator's that fades at rest; and between which columns its row of Φ_d is not zero."""
 
 
 class ControlArrays(NamedTuple):

@@ -152,3 +152,18 @@ def close_with_currents(
     advance_models(ControlArrays(records, models, transition, xi), settings, sample)
     sample.virtual_input[:] = sample.realised
     return limited_by
+
+
+def warm_up(arrays: ControlArrays, gives_currents: bool) -> None:
+    """Compile, or load what was compiled: a law that fails in flight cannot wait for that.
+
+    ``arrays`` stay as they are.
+    """
+    copies = ControlArrays(*(array.copy() for array in arrays))
+    zero, currents = np.zeros(5), np.zeros((2, 4))
+    open_sample(*copies, np.zeros(4), 0.0, 0.0, zero, zero, zero, np.empty((TOLD, 5)))
+    close_by_itself(*copies, *currents)
+    if gives_currents:
+        close_with_currents(*copies, *currents)
+    else:
+        close_with_input(*copies, zero, *currents)

@@ -45,7 +45,7 @@ class ControllerNodeParameters(SourceParameters, ControllerParameters):
 
     enabled: bool = parameter(True, 'follow the reference from the start; false: after ~/enable')
     reference_timeout: float = parameter(
-        2.0,
+        4.0,
         'lockstep: longest wait for a reference in flight, wall clock; then it lands',
         unit='s',
         within=(0.1, 600.0),
@@ -156,14 +156,18 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         elif sequence - self._sequence > self._longest_gap and self.supervisor.flying:
             self.supervisor.stop(f'{sequence - self._sequence - 1} measurements are missing')
         if self.supervisor.references.newest < sequence:
+            self._keep_pending(message)  # for the landing, should this fail
             self._take_references()
-            if self._sequence == sequence:  # it was pending, and is answered
+            if self._sequence == sequence:  # it is answered
                 return
         if self._lockstep and self._awaits_reference(sequence):
-            if self._pending is None or self._pending.sequence != sequence:
-                self._pending, self._pending_since = message, time.monotonic()
+            self._keep_pending(message)
             return
         self._answer(message)
+
+    def _keep_pending(self, message: Measurement) -> None:
+        if self._pending is None or self._pending.sequence != message.sequence:
+            self._pending, self._pending_since = message, time.monotonic()
 
     def _in_another_mode(self, message: Measurement) -> bool:
         """Whether the stage runs in another mode than ours, with which there is no working."""

@@ -39,6 +39,7 @@ from maglev_controller.foreign_sample import (
     close_with_currents,
     close_with_input,
     open_sample,
+    warm_up,
 )
 from maglev_controller.laws import control_law, find_law
 from maglev_controller.parameters import ControllerParameters, EncoderParameters
@@ -84,9 +85,8 @@ class Regulator:
         chosen = control_law(parameters)
         if law is not None:
             check_foreign(parameters)
-        if (
-            law is not None or chosen.make is not None
-        ):  # what runs along has to follow what acts in its place
+        # What runs along has to follow what acts in its place.
+        if law is not None or chosen.make is not None:
             parameters = replace(parameters, {'internal_model.antiwindup': 'observer'})
         self.designs: tuple[AxisDesign, ...] = tuple(
             chosen.design(parameters, name) for name in AXES
@@ -111,6 +111,8 @@ class Regulator:
             )
         else:
             self.foreign = None if make is None else ForeignLaw(make, self.parameters)
+        if self.foreign is not None:
+            warm_up(self._arrays, self.foreign.gives_currents)
 
     def _use(self, arrays: ControlArrays) -> None:
         self._arrays = arrays
@@ -309,6 +311,11 @@ def _control_arrays(
         if design.fades and design.model is not None:
             models['oscillates'][index, :n] = design.model.oscillating
         transition[index, :n, :n] = design.transition
+        for row in range(n):
+            there = np.flatnonzero(design.transition[row])
+            if there.size:
+                models['first'][index, row] = there[0]
+                models['end'][index, row] = there[-1] + 1
     return ControlArrays(
         records=records,
         models=models,

@@ -219,7 +219,7 @@ def advance_models(control: ControlArrays, settings: Record, sample: Record) -> 
             oscillates = models[index, row].oscillates
             told = learned * error if oscillates else error
             value = models[index, row].drive * told + models[index, row].antiwindup * lost
-            for column in range(states):
+            for column in range(models[index, row].first, models[index, row].end):
                 value += transition[index, row, column] * xi[index, column]
             following[row] = kept * value if oscillates else value
         for row in range(states):

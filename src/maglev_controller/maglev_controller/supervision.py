@@ -204,7 +204,7 @@ class Supervisor:
             self.learning.rest()
 
     def _wants_current(self, row: int) -> bool:
-        return self.references.phase[row] not in (Phase.REST, Phase.END)
+        return self.references.phase.item(row) not in (Phase.REST, Phase.END)
 
     def _end(self, gap: float) -> None:
         """The reference wants no current any more."""
@@ -215,10 +215,11 @@ class Supervisor:
 
     def _follow(self, row: int, gap: FloatArray, x: float, z: float) -> None:
         references = self.references
-        if references.segment[row] != self._segment:
-            self._segment = int(references.segment[row])
+        phase, segment = references.phase.item(row), references.segment.item(row)
+        if segment != self._segment:
+            self._segment = segment
             restart = self.parameters.internal_model.restart_at_step
-            if restart and references.phase[row] == Phase.STEP:
+            if restart and phase == Phase.STEP:
                 self.regulator.reset()
         self._row = row
         self._regulate(
@@ -228,7 +229,7 @@ class Supervisor:
             references.position[row],
             references.velocity[row],
             references.acceleration[row],
-            references.phase[row] == Phase.TRACK,
+            phase == Phase.TRACK,
         )
         if self.regulator.fault and self.mode == Mode.REGULATING:
             self.stop(self.regulator.fault)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import json
 import signal
 import sys
 import time
@@ -17,6 +18,7 @@ from typing import NoReturn
 
 import numpy as np
 
+from maglev_hw_bridge.amplifiers import Amplifiers
 from maglev_hw_bridge.board import undisturbed
 from maglev_hw_bridge.diagnosis import diagnose
 from maglev_hw_bridge.doubts import doubts
@@ -34,6 +36,7 @@ from maglev_hw_bridge.stage import BridgeStage
 from maglev_model.axes import FloatArray
 from maglev_model.command import leave_with
 from maglev_model.parameters import ParameterError, from_yaml
+from maglev_model.progress import add_output_options, talking
 from maglev_model.stage import StageError
 
 _HOP = 5e-4  # first lift-off [m]
@@ -58,6 +61,7 @@ class Commissioning:
         self._realtime = parameters.driver != 'emulated'
         self._encoders = Encoders(parameters)
         self._counts = np.zeros(6, dtype=np.int32)
+        Amplifiers(parameters).drive_phases(np.zeros(PHASES))  # compiled while no watchdog runs
 
     def run(self) -> None:
         """All steps. Raises WrongError, StoppedError, DriverError, StageError, ParameterError."""
@@ -230,16 +234,37 @@ def run(arguments: Sequence[str] | None = None) -> int:
         help='largest current of a phase alone, 0.2 to 3 A (default 1.5)',
     )
     parser.add_argument('--yes', action='store_true', help='do not ask before each step')
+    add_output_options(parser)
     options = parser.parse_args(arguments)
     if not 0.2 <= options.current <= 3.0:
         parser.error(f'--current is {options.current:g} A, it must lie in [0.2, 3]')
+    if options.quiet and not options.yes:
+        parser.error('--quiet needs --yes: it asks nothing')
+    said: list[str] = []
+    with talking(options):
+        code = _commission(options, said)
+    if options.json:
+        print(json.dumps({'passed': code == 0, 'said': said}))
+    return code
+
+
+def _commission(options: argparse.Namespace, said: list[str]) -> int:
+    """Exit code; what is said on the way is put down, too."""
+
+    def tell(text: str) -> None:
+        said.append(text.strip())
+        print(text)
+
     try:
         parameters = _load(options.params)
         driver = make_driver(parameters, realtime=parameters.driver != 'emulated')
         operator = _operator(driver, options.yes)
         with _ended_by_signals():
-            Commissioning(parameters, driver, peak=options.current, operator=operator).run()
+            Commissioning(
+                parameters, driver, peak=options.current, operator=operator, tell=tell
+            ).run()
     except WrongError as error:
+        said.append(f'wrong: {error}')
         print(f'\ncommission: wrong: {error}', file=sys.stderr)
         return 1
     except (ParameterError, DriverError, StageError) as error:
@@ -248,7 +273,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except (StoppedError, EOFError, KeyboardInterrupt):
         print('\ncommission: stopped; no current flows', file=sys.stderr)
         return 130
-    print('\ncommission: all is well')
+    print(
+        '\ncommission: all is well; next: scenarios/ellipse.sh --stage hw_bridge, --params as here'
+    )
     return 0
 
 

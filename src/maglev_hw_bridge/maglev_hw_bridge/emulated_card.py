@@ -287,6 +287,7 @@ def _memory(buffer: Any, dtype: Any, n: int) -> NDArray[Any]:
 
 def _channels(buffer: Any, n: int, number: int) -> NDArray[np.uint32]:
     channels = _memory(buffer, np.uint32, n)
-    if n and int(channels.max()) >= number:
-        raise HILError(Code.BAD_CHANNEL, f'there is no channel {int(channels.max())}')
+    highest = max(channels.tolist(), default=0)
+    if highest >= number:
+        raise HILError(Code.BAD_CHANNEL, f'there is no channel {highest}')
     return channels

@@ -16,7 +16,8 @@ from maglev_hw_bridge.landing import LEAST_ATTRACTION
 from maglev_hw_bridge.mode import Mode
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_model.axes import FloatArray
-from maglev_model.inverse import CurrentLimits, exact_currents
+from maglev_model.currents import exact_currents
+from maglev_model.inverse import CurrentLimits
 from maglev_model.machine import machine_constants
 
 _RISE, _HOVER = 0.5, 0.5  # [s]

@@ -159,6 +159,16 @@ def count(rig_block: Block, stage_block: Block, out: NDArray[np.int64]) -> None:
         out[i] = math.floor(stage.reading[i] / resolution + 0.5)
 
 
+@compiled
+def tell(stage_block: Block, out: FloatArray) -> None:
+    """The truth behind the counts taken last, ``out`` (24,), as :meth:`Rig.tell` has it."""
+    stage: StageArrays = stage_block[0]
+    out[:10] = stage.state
+    out[10:18] = stage.command
+    for i in range(6):
+        out[18 + i] = stage.effects.sensor.own[i] - stage.reading[i]
+
+
 class Rig:
     """Amplifiers, windings, platen and counters, carried on sample by sample."""
 
@@ -202,6 +212,13 @@ class Rig:
         count(self.arrays.block, self.stage.block, self._total)
         counts: NDArray[np.int64] = self._start + self._direction * self._total
         return counts
+
+    def tell(self, out: FloatArray) -> None:
+        """What was counted last was taken of, into ``out`` (24,).
+
+        x1..x10; i_d, then i_q flowing [A]; how much more than whole counts the scales have [m].
+        """
+        tell(self.stage.block, out)
 
     @property
     def state(self) -> FloatArray:

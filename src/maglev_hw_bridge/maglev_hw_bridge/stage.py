@@ -87,9 +87,10 @@ class BridgeStage(StageLife):
         """The true state of the sample read last; None unless the boards are emulated."""
         if self._all_knowing is None:
             return None
-        state, current = self._all_knowing.truth()
+        state, current, between = self._all_knowing.truth()
         load: FloatArray = self.amplifiers.arrays.load.reshape(4, 3).max(axis=1)
-        return Truth(state, current[:4], current[4:], load)
+        own_length = self.encoders.arrays.length + between
+        return Truth(state, current[:4], current[4:], load, own_length)
 
     def read(self) -> EncoderSample:
         """The next sample; waits for the boards' clock. Raises StageError when they are lost."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import importlib.util
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -11,19 +9,18 @@ from typing import Any, TypeVar, cast
 
 import numba
 
-Function = TypeVar('Function', bound=Callable[..., Any])
+from maglev_model.sources import sources_digest
 
-_COMPILED_PACKAGES = tuple(
-    f'maglev_{room}' for room in ('model', 'plant', 'controller', 'hw_bridge', 'study')
-)
+Function = TypeVar('Function', bound=Callable[..., Any])
 
 
 def compiled(function: Function) -> Function:
     """Compile a function with Numba and keep the machine code on disk; its type is left as it is.
 
-    Arithmetic stays IEEE in the order written (no fast-math), so that runs repeat bit by bit.
+    Arithmetic stays IEEE in the order written (no fast-math), so that runs repeat bit by bit; a
+    division by zero gives infinity or NaN, as in NumPy, which costs no test of each divisor.
     """
-    return cast(Function, numba.njit(cache=True)(function))
+    return cast(Function, numba.njit(cache=True, error_model='numpy')(function))
 
 
 def _cache_by_sources() -> None:
@@ -34,14 +31,8 @@ def _cache_by_sources() -> None:
     """
     if 'NUMBA_CACHE_DIR' in os.environ:
         return
-    digest = hashlib.sha256()
-    for package in _COMPILED_PACKAGES:
-        spec = importlib.util.find_spec(package)
-        if spec is not None and spec.origin is not None:
-            for path in sorted(Path(spec.origin).parent.rglob('*.py')):
-                digest.update(path.read_bytes())
     home = Path(os.environ.get('XDG_CACHE_HOME') or Path.home() / '.cache')
-    numba.config.CACHE_DIR = str(home / 'maglev-stage' / digest.hexdigest()[:16])
+    numba.config.CACHE_DIR = str(home / 'maglev-stage' / sources_digest())
 
 
 _cache_by_sources()

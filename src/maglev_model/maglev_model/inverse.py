@@ -22,7 +22,6 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
@@ -215,14 +214,14 @@ def exact_inverse(
     if machine.motors == 1.0:
         return _single_motor_inverse(machine, limits, controlled, output, wanted, answer)
     direct, quadrature, realised, excess = answer
-    gap, a, b, h = np.empty(4), np.empty(4), np.empty(4), np.empty(4)
+    work = np.empty((5, 4))
+    gap, a, b, h, attraction = work[0], work[1], work[2], work[3], work[4]
     gaps_from_outputs(machine, output, gap)
     for motor in range(4):
         a[motor], b[motor], h[motor] = attraction_coefficients(machine, gap[motor])
     h_x, h_z = -(h[1] + h[3]) / machine.M_x, -(h[0] + h[2]) / machine.M_z
     u_x = controlled[1] * wanted[1] / h_x
     u_z = controlled[2] * wanted[2] / h_z
-    attraction = np.empty(4)
     limited_by = _allocate(machine, limits, controlled, output, wanted, a, b, u_x, u_z, attraction)
     limit_x = _quadrature_limit(limits, a, b, attraction, 1)
     limit_z = _quadrature_limit(limits, a, b, attraction, 0)
@@ -363,38 +362,3 @@ def _direct_currents(
             limited_by |= CURRENT
         direct[motor] = limited
     return limited_by
-
-
-@compiled
-def _all_currents(
-    machine: Machine,
-    limits: CurrentLimits,
-    outputs: FloatArray,
-    wanted: FloatArray,
-    direct: FloatArray,
-    quadrature: FloatArray,
-    possible: NDArray[np.bool_],
-) -> None:
-    controlled, realised, excess = np.ones(5), np.empty(5), np.empty(2)
-    for k in range(outputs.shape[0]):
-        answer = Answer(direct[k], quadrature[k], realised, excess)
-        limited_by = exact_inverse(machine, limits, controlled, outputs[k], wanted[k], answer)
-        possible[k] = limited_by == 0
-
-
-def exact_currents(
-    machine: Machine, outputs: FloatArray, wanted: FloatArray, limits: CurrentLimits = NO_LIMITS
-) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-    """The currents that :func:`exact_inverse` gives at n instants.
-
-    ``outputs`` y, x, z, phi, theta [m, rad] and ``wanted`` accelerations [m/s², rad/s²], shape (n,
-    5). Returns i_d and i_q of motors 1..4 [A], shape (n, 4), and whether they make the
-    accelerations, shape (n,).
-    """
-    n = len(outputs)
-    direct, quadrature = np.empty((n, 4)), np.empty((n, 4))
-    possible = np.empty(n, dtype=np.bool_)
-    outputs = np.ascontiguousarray(outputs, dtype=np.float64)
-    wanted = np.ascontiguousarray(wanted, dtype=np.float64)
-    _all_currents(machine, limits, outputs, wanted, direct, quadrature, possible)
-    return direct, quadrature, possible

@@ -11,9 +11,13 @@ class MissingLibraryError(ImportError):
 
 
 @contextlib.contextmanager
-def needed(name: str, what: str) -> Iterator[None]:
-    """Import a library that only ``what`` needs; raises :class:`MissingLibraryError` naming it."""
+def needed(name: str, what: str, versions: str = '') -> Iterator[None]:
+    """Import a library that only ``what`` needs, in some ``versions``, ``>=2,<3``.
+
+    Raises :class:`MissingLibraryError` naming it.
+    """
     try:
         yield
     except ImportError as error:
-        raise MissingLibraryError(f'{what} needs {name}: pip install {name}') from error
+        wanted = f"'{name}{versions}'" if versions else name
+        raise MissingLibraryError(f'{what} needs {name}: pip install {wanted}') from error

@@ -25,6 +25,7 @@ class Truth(NamedTuple):
     direct_current: FloatArray  # i_d flowing in motors 1..4 [A], shape (4,)
     quadrature_current: FloatArray  # i_q flowing in motors 1..4 [A], shape (4,)
     thermal_load: FloatArray  # used share of the budget of each motor's hottest phase, shape (4,)
+    own_length: FloatArray  # gaps 1..4, x, z on the encoders' own scales [m], shape (6,)
 
 
 class Fault(NamedTuple):

@@ -104,9 +104,13 @@ class MaglevNode(PollingNode, Generic[P]):
             self._finished.set_result(None)
 
     def fail(self, message: str) -> None:
-        """Say what is wrong in one line and end the process with exit code 1."""
-        self.get_logger().error(message)
-        self.finish(1)
+        """Say what is wrong in one line, once, and end the process with exit code 1.
+
+        What had queued up is still dispatched before the process ends.
+        """
+        if self.exit_code is None:
+            self.get_logger().error(message)
+            self.finish(1)
 
     def close(self) -> None:
         """What must happen last; publishers still work. Must be quick and must not raise."""

@@ -26,7 +26,7 @@ _DELIVERY_TIME = 0.5
 
 _BACKGROUND_NICENESS = 5
 
-_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU)
 
 
 def run(make_node: Callable[[], MaglevNode[Any]], name: str) -> int:
@@ -35,14 +35,20 @@ def run(make_node: Callable[[], MaglevNode[Any]], name: str) -> int:
     SIGINT, SIGTERM and SIGHUP (unless ignored, as by nohup) end it in order, which is exit code 0
     unless the node says otherwise: :meth:`MaglevNode.close` runs and can still publish. After a
     second signal :meth:`MaglevNode.may_stop` is not asked again until it agrees; what it does
-    before it answers, such as a landing, no signal cuts short.
+    before it answers, such as a landing, no signal cuts short. SIGXCPU, from the kernel to what
+    never waits at real-time priority, ends it so too, with exit code 1.
     What the user did wrong is one line on stderr; a defect shows its traceback.
     """
     caught: list[int] = []
+
+    def catch(number: int, _frame: object) -> None:
+        if number != signal.SIGXCPU or number not in caught:  # which comes every second
+            caught.append(number)
+
     for number in _ENDING:
         if number == signal.SIGHUP and signal.getsignal(number) == signal.SIG_IGN:
             continue
-        signal.signal(number, lambda signum, _frame: caught.append(signum))
+        signal.signal(number, catch)
     node: MaglevNode[Any] | None = None
     prepare_middleware()
     try:
@@ -63,6 +69,10 @@ def run(make_node: Callable[[], MaglevNode[Any]], name: str) -> int:
         return 1
     finally:
         _close(node)
+    if signal.SIGXCPU in caught:
+        text = 'no wait for seconds on end: this machine is too slow or too busy for real time'
+        print(f'{name}: error: {text}', file=sys.stderr, flush=True)
+        return 1
     return node.exit_code or 0
 
 

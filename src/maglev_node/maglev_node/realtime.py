@@ -5,18 +5,60 @@ from __future__ import annotations
 import ctypes
 import os
 import resource
+import time
+from pathlib import Path
+
+_SPINNING = 'dds.asyn'
+"""Threads of Fast DDS that ask for a writer's lock again and again, without a pause."""
+
+_NAMING = 0.2  # in which a thread that has begun has given itself its name [s]
+_LONGEST_BURST = 5_000_000, 10_000_000
+"""Longest time that a thread of real-time priority may run without a wait: to SIGXCPU, to SIGKILL
+[us]."""
 
 _CURRENT, _FUTURE, _ON_FAULT = 1, 2, 4  # mlockall(2)
 
 
 def take_priority(priority: int) -> bool:
-    """Put all threads of this process under SCHED_FIFO; whether that is permitted (ulimit -r)."""
+    """Put all threads of this process under SCHED_FIFO; whether that is permitted (ulimit -r).
+
+    Fast DDS sends again, and to late comers, in a thread that spins while another has the writer:
+    with the same priority it would keep that one from the processor, and the machine hung. What
+    runs for 5 s without a wait is told to end (SIGXCPU), and killed after 10 s.
+    """
+    _limit_bursts()
+    until = time.monotonic() + _NAMING
+    while not any(_spins(thread) for thread in _threads()) and time.monotonic() < until:
+        time.sleep(0.01)
     try:
-        for thread in os.listdir('/proc/self/task'):
-            os.sched_setscheduler(int(thread), os.SCHED_FIFO, os.sched_param(priority))
+        for thread in _threads():
+            spins = _spins(thread)
+            policy = os.SCHED_OTHER if spins and priority == 1 else os.SCHED_FIFO
+            rank = priority - spins
+            os.sched_setscheduler(int(thread.name), policy, os.sched_param(rank))
     except OSError:
         return False
     return True
+
+
+def _limit_bursts() -> None:
+    _, most = resource.getrlimit(resource.RLIMIT_RTTIME)
+    soft, hard = (
+        longest if most == resource.RLIM_INFINITY else min(longest, most)
+        for longest in _LONGEST_BURST
+    )
+    resource.setrlimit(resource.RLIMIT_RTTIME, (soft, hard))
+
+
+def _threads() -> list[Path]:
+    return list(Path('/proc/self/task').iterdir())
+
+
+def _spins(thread: Path) -> bool:
+    try:
+        return (thread / 'comm').read_text(encoding='utf-8').startswith(_SPINNING)
+    except OSError:  # it has ended
+        return False
 
 
 def lock_memory() -> bool:

@@ -100,5 +100,5 @@ class SamplePublisher:
         copy_stamp(self._measurement.header.stamp, state.header.stamp)
         state.sequence = self._measurement.sequence
         state.state, state.direct_current, state.quadrature_current = truth[:3]
-        state.thermal_load = truth.thermal_load
+        state.thermal_load, state.own_length = truth.thermal_load, truth.own_length
         self._true_publisher.publish(state)

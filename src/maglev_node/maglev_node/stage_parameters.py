@@ -13,8 +13,9 @@ class StageNodeParameters(ManagedParameters):
     """What every stage's node takes."""
 
     answer_timeout: float = parameter(
-        5.0,
-        'lockstep: longest wait for the currents of a sample, wall clock',
+        8.0,
+        'lockstep: longest wait for the currents of a sample, wall clock; longer than the'
+        " controller's 'reference_timeout'",
         unit='s',
         within=(0.1, 600.0),
     )

@@ -67,6 +67,10 @@ class StageArrays(Record):
     load: Annotated[FloatArray, 12]  # thermal load by phase
     limited: Annotated[NDArray[np.int8], 12]  # 1 where that phase has spent its budget
 
+    lag: Annotated[FloatArray, 8]  # of the currents; this and the next two are ``advance``'s own
+    current: Annotated[FloatArray, 3, 8]  # at the start, in the middle and at the end of a step
+    work: Annotated[FloatArray, 6, 10]
+
     command: Annotated[FloatArray, 8]  # currents [A]
     reading: Annotated[FloatArray, 6]  # gaps of motors 1..4, x, z [m]
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
 from maglev_model.machine import Machine
@@ -92,19 +90,21 @@ def advance(block: Block) -> None:
     set_targets(stage, machine)
     step, end = stage.step, stage.lag_end
     start = stage.sample * (step * stage.substeps)
-    state, target = stage.state[:], stage.target
-    lag = stage.flowing - target if end > 0.0 else np.zeros(8)
-    current = np.empty((3, 8))
-    work = np.empty((6, 10))
+    state, target, lag = stage.state, stage.target, stage.lag
+    current, work = stage.current, stage.work
     before = work[5]
+    for i in range(8):
+        lag[i] = stage.flowing[i] - target[i] if end > 0.0 else 0.0
     for n in range(stage.substeps):
         for i in range(8):
             current[0, i] = target[i] + stage.lag_start * lag[i]
             current[1, i] = target[i] + stage.lag_middle * lag[i]
             lag[i] *= end
             current[2, i] = target[i] + lag[i]
-        before[:] = state
+        for i in range(10):
+            before[i] = state[i]
         _runge_kutta(stage, machine, start + n * step, state, current, work)
         apply_stops(stage, before)
-    stage.flowing[:] = current[2]
+    for i in range(8):
+        stage.flowing[i] = current[2, i]
     stage.sample += 1

@@ -68,6 +68,7 @@ def encode(block: Block) -> None:
     reading[3] = y - tilt_theta
     reading[4], reading[5] = state[2], state[4]
     for i in range(6):
+        stage.effects.sensor.own[i] = reading[i]
         resolution = stage.gap_resolution if i < 4 else stage.horizontal_resolution
         noise = stage.gap_noise if i < 4 else stage.horizontal_noise
         reading[i] = _read(reading[i], resolution, noise, stage.seed, stage.sample, i)

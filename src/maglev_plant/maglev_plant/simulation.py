@@ -84,7 +84,7 @@ class SimulatedStage:
     @property
     def flying(self) -> bool:
         """Whether currents are held."""
-        return bool(self._arrays.command.any())
+        return any(self._arrays.command.tolist())
 
     @property
     def state(self) -> FloatArray:
@@ -109,7 +109,13 @@ class SimulatedStage:
 
     def truth(self) -> Truth:
         """The true state of the sample the plant stands at."""
-        return Truth(self.state, self.direct_current, self.quadrature_current, self.thermal_load)
+        return Truth(
+            self.state,
+            self.direct_current,
+            self.quadrature_current,
+            self.thermal_load,
+            np.array(self._arrays.effects.sensor.own),
+        )
 
     def configure(self) -> None:
         """Go to sample 0 and the initial state, without current or fault, amplifiers cold.

@@ -32,6 +32,10 @@ _HELD = 1e-3  # relative difference up to which a frequency counts as held
 _WEAK = 0.05  # of the largest harmonic; those below it are not named
 _STILL = 1e-9  # amplitude below which an output stands still [m, rad]
 _NAMED = 3
+_OFFER = (
+    "internal models to match: 'ros2 run maglev_reference match' makes an overlay of them from the "
+    'parameter files of the reference'
+)
 
 
 def compliance(
@@ -129,6 +133,8 @@ def warnings(parameters: ReferenceParameters) -> list[str]:
         missed = [line for line in lines if not np.any(np.abs(held - line) <= _HELD * line)]
         if missed:
             told.append(_missed(axis, missed, float(error[axis])))
+    if told and path.period is not None:
+        told.append(_OFFER)
     if path.length is not None and path.length > parameters.duration:
         told.append(
             f'the course takes {path.length:.2f} s, its first {parameters.duration:g} s are '

@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from maglev_model.axes import AXES, PHI, FloatArray
+from maglev_model.currents import exact_currents
 from maglev_model.guide import GuideParameters
-from maglev_model.inverse import exact_currents
 from maglev_model.machine import machine_constants
 from maglev_reference.check import UnreachableError
 from maglev_reference.motion import Kinematics

@@ -45,34 +45,41 @@ class Sinusoids:
         self.terms = tuple(term for term in terms if term.amplitude != 0.0)
 
     @classmethod
-    def sums(cls, parameters: SinusoidParameters) -> Sinusoids:
-        """The group ``sinusoids``."""
+    def sums(cls, parameters: SinusoidParameters, fundamental: float) -> Sinusoids:
+        """The group ``sinusoids``; a frequency of 0 is the ``fundamental`` [rad/s]."""
         axes = parameters.axes()
         return cls(
             np.array([axis.offset for axis in axes]),
             [
-                Term(index, *term)
+                Term(index, amplitude, frequency or fundamental, phase)
                 for index, axis in enumerate(axes)
-                for term in zip(axis.amplitude, axis.frequency, axis.phase, strict=True)
+                for amplitude, frequency, phase in zip(
+                    axis.amplitude, axis.frequency, axis.phase, strict=True
+                )
             ],
         )
 
     @classmethod
-    def circle(cls, parameters: CircleParameters, home: FloatArray) -> Sinusoids:
-        """The group ``circle``, about ``home`` (5,)."""
-        radius, frequency = parameters.radius, parameters.frequency
+    def circle(
+        cls, parameters: CircleParameters, home: FloatArray, fundamental: float
+    ) -> Sinusoids:
+        """The group ``circle``, about ``home`` (5,); a frequency of 0 is the ``fundamental``."""
+        radius, frequency = parameters.radius, parameters.frequency or fundamental
         return cls(
             home, [Term(X, radius, frequency, 0.0), Term(Z, radius, frequency, 0.5 * math.pi)]
         )
 
     @classmethod
-    def lissajous(cls, parameters: LissajousParameters, home: FloatArray) -> Sinusoids:
-        """The group ``lissajous``, about ``home`` (5,)."""
+    def lissajous(
+        cls, parameters: LissajousParameters, home: FloatArray, fundamental: float
+    ) -> Sinusoids:
+        """The group ``lissajous``, about ``home`` (5,); its fundamental may be 0 likewise."""
+        omega = parameters.fundamental or fundamental
         rows = zip(parameters.amplitude, parameters.multiple, parameters.phase, strict=True)
         return cls(
             home,
             [
-                Term(axis, amplitude, multiple * parameters.fundamental, phase)
+                Term(axis, amplitude, multiple * omega, phase)
                 for axis, (amplitude, multiple, phase) in enumerate(rows)
             ],
         )
@@ -94,13 +101,13 @@ class Helix:
 
     From one end to the other both change evenly with the angle; within a quarter of a turn of an
     end they come to rest and turn round. It repeats after ``period`` [s] and begins at the first
-    end.
+    end. A frequency of 0 is the ``fundamental`` [rad/s].
     """
 
-    def __init__(self, parameters: HelixParameters, home: FloatArray) -> None:
+    def __init__(self, parameters: HelixParameters, home: FloatArray, fundamental: float) -> None:
         self._home = np.array(home, dtype=float)
-        self._frequency = parameters.frequency
-        turn = 2.0 * math.pi / parameters.frequency
+        self._frequency = parameters.frequency or fundamental
+        turn = 2.0 * math.pi / self._frequency
         self._half = parameters.turns * turn
         self.period = 2.0 * self._half
         self._rounding = 0.25 * turn

@@ -1,4 +1,4 @@
-"""A trajectory that is given while the platen hovers: points in time, joined smoothly.
+"""What is given while the platen hovers: points in time, joined smoothly, or a step of one axis.
 
 It is checked like any other reference, but a piece at a time, because meanwhile the hover goes on.
 """
@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from maglev_model.axes import AXES, UNITS, FloatArray
+from maglev_model.quintic import minimum_jerk_time
 from maglev_reference.check import UnreachableError, check_locked, check_samples
 from maglev_reference.currents import check_currents
 from maglev_reference.motion import Kinematics, Quintic, State
@@ -67,6 +68,23 @@ class Through:
             for values, part in zip(found, moved, strict=True):
                 values[rows] = part
         return found
+
+
+def step(axis: str, distance: float, hover: FloatArray, parameters: ReferenceParameters) -> Through:
+    """From a hover (5,) at minimum jerk by a ``distance`` [m, rad], in the time of a shaped step.
+
+    Raises :class:`UnreachableError` for what is no axis, and for more than its ``limits.step``.
+    """
+    (column,) = _columns((axis,))
+    limit, velocity = parameters.limits.step[column], parameters.limits.velocity[column]
+    if not abs(distance) <= limit:
+        unit = UNITS[column]
+        raise UnreachableError(
+            f'{axis} shall step by {distance:g} {unit}, it may by {limit:g} {unit} (limits.step)'
+        )
+    least = minimum_jerk_time(distance, velocity, parameters.steps.acceleration[column])
+    end = Point(max(parameters.steps.shaping_time, least), (float(hover[column]) + distance,))
+    return Through((axis,), (end,), hover)
 
 
 def _columns(names: Sequence[str]) -> list[int]:

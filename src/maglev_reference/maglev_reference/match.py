@@ -1,6 +1,7 @@
 """Internal models that match a repeated trajectory, as an overlay for all nodes.
 
     match scenario_square.yaml > matched_square.yaml
+    match path.csv > matched_path.yaml
 
 The fundamental is the trajectory's period; each output that moves gets the harmonics at which
 friction would leave the largest errors, one after another, as long as their frequencies sum up to
@@ -20,7 +21,7 @@ import numpy as np
 
 from maglev_model.axes import AXES
 from maglev_model.command import leave_with
-from maglev_model.parameters import ParameterError, from_yaml
+from maglev_model.parameters import ParameterError, from_yaml, replace
 from maglev_reference.accuracy import compliance, disturbance_lines
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.trajectories import course
@@ -83,7 +84,11 @@ def run(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog='match', description='Internal models for a repeated trajectory, as an overlay.'
     )
-    parser.add_argument('file', nargs='+', help='parameter files of the reference, the last wins')
+    parser.add_argument(
+        'file',
+        nargs='+',
+        help='parameter files of the reference, the last wins; or a trajectory as .csv',
+    )
     parser.add_argument(
         '--count',
         type=int,
@@ -98,7 +103,11 @@ def run(arguments: Sequence[str] | None = None) -> int:
     )
     given: Any = parser.parse_args(arguments)
     try:
-        parameters = from_yaml(ReferenceParameters, 'reference', *given.file)
+        tables = [name for name in given.file if not name.endswith('.csv')]
+        parameters = from_yaml(ReferenceParameters, 'reference', *tables)
+        for path in (name for name in given.file if name.endswith('.csv')):
+            followed = {'trajectory': 'file', 'file.path': path, 'file.repeat': True}
+            parameters = replace(parameters, followed)
         print(overlay(*matched(parameters, given.count, given.total)), end='')
     except ParameterError as error:
         print(f'match: error: {error}', file=sys.stderr)

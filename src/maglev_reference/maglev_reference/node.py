@@ -19,6 +19,7 @@ from maglev_model.modes import Mode
 from maglev_model.parameters import parameter
 from maglev_model.phases import Phase
 from maglev_msgs.msg import ControllerState, Measurement, Reference
+from maglev_msgs.srv import Step
 from maglev_node.graph_guard import GraphGuard, Watchers
 from maglev_node.mode_check import mode_conflict
 from maglev_node.node import MaglevNode, SourceParameters
@@ -65,8 +66,9 @@ class ReferenceNodeParameters(SourceParameters, ReferenceParameters):
         read_only=True,
     )
     timeout: float = parameter(
-        1.0,
-        'longest time without a measurement while running, wall clock',
+        12.0,
+        'longest time without a measurement while running, wall clock; in lockstep longer than the'
+        " stage's 'answer_timeout'",
         unit='s',
         within=(0.05, 600.0),
         read_only=True,
@@ -88,6 +90,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         '~/trajectory': 'subscribed: trajectory_msgs/JointTrajectory to follow from a hover',
         '~/lift_off': 'std_srvs/Trigger: start from rest',
         '~/land': 'std_srvs/Trigger: land from wherever the platen is',
+        '~/step': 'maglev_msgs/Step: from a hover, one axis by a distance',
     }
 
     def __init__(self) -> None:
@@ -113,6 +116,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         self.create_subscription(JointTrajectory, '~/trajectory', self._on_trajectory, 1)
         self.create_service(Trigger, '~/lift_off', self._lift_off)
         self.create_service(Trigger, '~/land', self._land)
+        self.create_service(Step, '~/step', self._step)
         self.create_timer(self.parameters.poll_period, self._poll, clock=self.steady_clock)
         self.take_realtime_priority()
 
@@ -328,6 +332,21 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         else:
             response.success = self._run.land()
             response.message = 'landing' if response.success else 'landing already, or landed'
+        return response
+
+    def _step(self, request: Any, response: Any) -> Any:
+        """Answered when it is checked; in between, what is due goes out."""
+        try:
+            self._run.propose_step(request.axis, request.distance)
+            while (length := self._run.consider()) is None:
+                self._take_measurement()
+                self._publish()
+        except UnreachableError as error:
+            response.success, response.message = False, f'step refused: {error}'
+        else:
+            response.success = True
+            response.message = f'{request.axis} steps in {length:g} s, then hovers'
+            self.get_logger().info(response.message)
         return response
 
     def diagnose(self) -> tuple[bytes, str, Mapping[str, object]]:

@@ -15,7 +15,7 @@ from maglev_model.axes import FloatArray
 from maglev_model.modes import Mode
 from maglev_model.phases import Phase
 from maglev_reference.check import UnreachableError
-from maglev_reference.given_points import Candidate, Point, Through
+from maglev_reference.given_points import Candidate, Point, Through, step
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.timeline import Block, Timeline
 
@@ -181,9 +181,14 @@ class ReferenceRun:
 
         Raises UnreachableError where it makes no motion, and while the platen does not hover.
         """
-        self._candidate = Candidate(
-            Through(names, points, self._hover()), self._hover(), self._parameters
-        )
+        hover = self._hover()
+        self._candidate = Candidate(Through(names, points, hover), hover, self._parameters)
+
+    def propose_step(self, axis: str, distance: float) -> None:
+        """The same for a step of one axis by a ``distance`` [m, rad]."""
+        hover = self._hover()
+        motion = step(axis, distance, hover, self._parameters)
+        self._candidate = Candidate(motion, hover, self._parameters)
 
     def consider(self) -> float | None:
         """Check some more of what was proposed; its length [s] when it is followed from now on.

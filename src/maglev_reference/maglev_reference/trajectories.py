@@ -60,16 +60,16 @@ def course(parameters: ReferenceParameters) -> Course:
     Raises ParameterError for what cannot be built: a file that is not as it must be, corners
     larger than their square.
     """
-    home = np.array(parameters.home)
+    home, fundamental = np.array(parameters.home), parameters.internal_model.fundamental
     match parameters.trajectory:
         case 'sinusoids':
-            return _lined(Sinusoids.sums(parameters.sinusoids))
+            return _lined(Sinusoids.sums(parameters.sinusoids, fundamental))
         case 'circle':
-            return _lined(Sinusoids.circle(parameters.circle, home))
+            return _lined(Sinusoids.circle(parameters.circle, home, fundamental))
         case 'lissajous':
-            return _lined(Sinusoids.lissajous(parameters.lissajous, home))
+            return _lined(Sinusoids.lissajous(parameters.lissajous, home, fundamental))
         case 'helix':
-            helix = Helix(parameters.helix, home)
+            helix = Helix(parameters.helix, home, fundamental)
             return Course(helix, period=helix.period)
         case 'square':
             square = Square(parameters.square, home)

@@ -11,6 +11,7 @@ from maglev_model.loop_parameters import REFERENCE_FREQUENCY
 from maglev_model.parameters import ParameterError, group, parameter
 
 PROFILES = ('minimum_jerk', 'fastest')
+_FUNDAMENTAL = '0: that of the internal models, internal_model.fundamental'
 
 
 def same_length(where: str, names: Sequence[str], lengths: Sequence[int]) -> None:
@@ -33,10 +34,10 @@ class TiltSinusoids:
         (0.0,), 'amplitude of each sinusoid', unit='rad', within=(-0.014, 0.014)
     )
     frequency: tuple[float, ...] = parameter(
-        (REFERENCE_FREQUENCY,),
-        'angular frequency of each sinusoid',
+        (0.0,),
+        f'angular frequency of each sinusoid; {_FUNDAMENTAL}',
         unit='rad/s',
-        within=(0.01, 200.0),
+        within=(0.0, 200.0),
     )
     phase: tuple[float, ...] = parameter(
         (0.0,), 'phase of each sinusoid', unit='rad', within=(-2.0 * math.pi, 2.0 * math.pi)
@@ -123,7 +124,7 @@ class CircleParameters:
 
     radius: float = parameter(0.03, 'its radius', unit='m', within=(1e-5, 0.05))
     frequency: float = parameter(
-        REFERENCE_FREQUENCY, 'angular frequency', unit='rad/s', within=(0.01, 200.0)
+        0.0, f'angular frequency; {_FUNDAMENTAL}', unit='rad/s', within=(0.0, 200.0)
     )
 
 
@@ -143,7 +144,7 @@ class HelixParameters:
     )
     turns: int = parameter(4, 'turns from one end to the other', within=(1, 1000))
     frequency: float = parameter(
-        REFERENCE_FREQUENCY, 'angular frequency of the turns', unit='rad/s', within=(0.01, 200.0)
+        0.0, f'angular frequency of the turns; {_FUNDAMENTAL}', unit='rad/s', within=(0.0, 200.0)
     )
 
 
@@ -155,7 +156,10 @@ class LissajousParameters:
     """
 
     fundamental: float = parameter(
-        REFERENCE_FREQUENCY / 3.0, 'angular frequency', unit='rad/s', within=(0.01, 200.0)
+        REFERENCE_FREQUENCY / 3.0,
+        f'angular frequency; {_FUNDAMENTAL}',
+        unit='rad/s',
+        within=(0.0, 200.0),
     )
     amplitude: tuple[float, ...] = parameter(
         (0.0, 0.03, 0.03, 0.0, 0.0),

@@ -94,7 +94,7 @@ def node(name: str | None = None) -> Iterator[PollingNode]:
 def graph(
     arguments: Any, needed: Callable[[PollingNode], object] | None = None
 ) -> Iterator[PollingNode]:
-    """A node that has discovered what there is, ``needed`` in particular."""
+    """A node that has discovered what there is, or at least what is ``needed`` of it."""
     with node() as own:
         spin_time = getattr(arguments, 'spin_time', None)
         discover(own, spin_time, None if needed is None else lambda: bool(needed(own)))
@@ -114,7 +114,7 @@ def graph_with(arguments: Any) -> Iterator[tuple[PollingNode, str]]:
         return full in {each.full for each in nodes(own, hidden=hidden)}
 
     with node() as own:
-        if not discover(own, arguments.spin_time, there, at_once=True):
+        if not discover(own, arguments.spin_time, there):
             raise CommandError('Node not found')
         yield own, full
 
@@ -123,19 +123,16 @@ def discover(
     own: PollingNode,
     spin_time: float | None = None,
     needed: Callable[[], bool] | None = None,
-    *,
-    at_once: bool = False,
 ) -> bool:
     """Wait for ``spin_time`` [s], by default until the graph is known.
 
-    ``at_once`` ends the wait as soon as what is needed is there. Returns whether it is.
+    The wait ends as soon as what is ``needed`` is there. Returns whether it is.
     """
     start = changed = time.monotonic()
     seen: object = None
     while True:
         now = time.monotonic()
-        held = needed is None or needed()
-        if held and at_once:
+        if needed is not None and needed():
             return True
         state = _state(own)
         if state != seen:
@@ -146,7 +143,7 @@ def discover(
             known = now - changed >= QUIET and _complete(own, now - start)
             over = known or now - start >= MOST_WAIT
         if over:
-            return held
+            return needed is None
         time.sleep(_TICK)
 
 

@@ -16,7 +16,7 @@ from maglev_controller.regulator import MeasurementFault, Regulator
 from maglev_controller.sample_step import FIRST_FAULT, control_step
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
-from maglev_model.geometry import motor_gaps, outputs_of_gaps
+from maglev_model.geometry import outputs_of_gaps
 from maglev_model.records import Block
 from maglev_plant.arrays import StageArrays
 from maglev_plant.dynamics import advance
@@ -105,8 +105,7 @@ def _loop(
         state[k] = stage.state
         encode(block)
         reading[k] = stage.reading
-        if stage.effects.sensor.on:
-            own[k] = stage.effects.sensor.own
+        own[k] = stage.effects.sensor.own
         if learns:
             look_ahead(learning, control, follows[k])
         code[k] = control_step(
@@ -148,8 +147,7 @@ def _asking_loop(
         rows.state[k] = stage.state
         encode(block)
         rows.reading[k] = reading
-        if sensor.on:
-            rows.own[k] = sensor.own
+        rows.own[k] = sensor.own
         gap, x, z = reading[:4], reading.item(4), reading.item(5)
         try:
             rows.code[k] = regulator.step(gap, x, z, *reference, answer[:4], answer[4:])
@@ -215,9 +213,6 @@ def run(
     else:
         _asking_loop(regulator, arrays, references, rows, delayed)
     radius = stage.parameters.machine.radius
-    if not arrays.effects.sensor.on:
-        own[:, :4] = motor_gaps(state[:, ::2], radius)
-        own[:, 4:] = state[:, 2:5:2]
     return Run(state, reading, own, current[:, :4], current[:, 4:], code, radius)
 
 

@@ -100,20 +100,31 @@ def fly(
     the time that is measured. All parameters have the nodes' defaults, the benchmark plant among
     them. ``files`` are parameter files as the nodes take them, the later winning; what is given
     here by name wins over them, ``plant={'encoder.gap_noise': 1e-6}``; a whole table is taken as it
-    is, and ``files`` do not change it. ``law``, an object as in docs/extending.md, answers in place
+    is, and ``files`` do not change it. The reference has the controller's
+    ``internal_model.fundamental``, which trajectories without a frequency of their own follow.
+    ``law``, an object as in docs/extending.md, answers in place
     of the controller's own.
 
     Raises ParameterError naming what is wrong with a parameter or out of the reference's reach, and
-    MeasurementFault when the regulator gives the platen up, LawFault when a law of your own fails.
+    MeasurementFault when the regulator gives the platen up, LawFault when a law of your own fails,
+    TypeError for a trajectory that is no name.
     """
     followed: dict[str, object] = {}
+    if not isinstance(trajectory, str | None):
+        raise TypeError(
+            f"'trajectory' is a {type(trajectory).__name__}, it takes a name such as 'ellipse'; "
+            'what belongs to it is given as reference={...}'
+        )
     if trajectory is not None:
         followed.update(_NAMED.get(trajectory, {'trajectory': trajectory}))
     if duration is not None:
         followed['duration'] = duration
     stage_table = _table(PlantParameters, 'plant', files, plant)
     control_table = _table(ControllerParameters, 'controller', files, controller)
-    course = _table(ReferenceParameters, 'reference', files, {**followed, **(reference or {})})
+    shared = {'internal_model.fundamental': control_table.internal_model.fundamental}
+    course = _table(
+        ReferenceParameters, 'reference', files, {**shared, **followed, **(reference or {})}
+    )
     for name, table in (('plant', stage_table), ('controller', control_table)):
         if table.sample_time != course.sample_time:
             raise ParameterError(

@@ -33,9 +33,14 @@ def simulate(
 
     ``law`` takes what the encoders read, ``gap`` (4,), ``x`` and ``z`` [m], and returns i_d and i_q
     of motors 1..4 [A], (4,) each. Row k of what comes back is sample k. Raises TypeError for what
-    is no :class:`PlantParameters`, ValueError for a duration that is none and for currents that are
-    not finite or not four.
+    is no function or no :class:`PlantParameters`, ValueError for a duration that is none and for
+    currents that are not finite or not four.
     """
+    if not callable(law):
+        raise TypeError(
+            f"'law' is a {type(law).__name__}, it takes a function of the encoders' reading that "
+            'returns i_d and i_q; parameters are given as plant=PlantParameters(...)'
+        )
     parameters = a_table(PlantParameters, plant, 'plant')
     if not (math.isfinite(duration) and duration > 0.0):
         raise ValueError(f"'duration' is {duration} s, it must be finite and above 0")

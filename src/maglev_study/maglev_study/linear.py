@@ -15,11 +15,12 @@ from numpy.typing import ArrayLike
 from maglev_controller.design.axis_design import AxisDesign, feedback_system
 from maglev_controller.design.notch import notch_system
 from maglev_controller.design.state_space import discretise
-from maglev_controller.laws import control_law
+from maglev_controller.laws import ControlLaw, control_law
 from maglev_controller.parameters import ControllerParameters
 from maglev_model.axes import AXES, FloatArray
 from maglev_model.compiled import compiled
-from maglev_model.inverse import NO_LIMITS, exact_currents
+from maglev_model.currents import exact_currents
+from maglev_model.inverse import NO_LIMITS
 from maglev_model.machine_array import machine_from_array
 from maglev_model.optional import needed
 from maglev_model.parameters import ParameterError
@@ -49,10 +50,14 @@ def _rates(block: Block, time: float, state: FloatArray, current: FloatArray) ->
     return rate
 
 
-class _Stage:
-    """The plant between its stops, and the currents that hold it at ``at``."""
+class StageAt:
+    """The plant between its stops ``at`` y, x, z, phi, theta, and the currents that hold it there.
 
-    def __init__(self, parameters: PlantParameters, at: ArrayLike) -> None:
+    Where ``speed`` is not 0, every axis passes there at that rate [m/s, rad/s], so that friction
+    has the slope it has then.
+    """
+
+    def __init__(self, parameters: PlantParameters, at: ArrayLike, speed: float = 0.0) -> None:
         self.arrays = stage_arrays(parameters)
         if self.arrays.effects.moving:
             raise ParameterError(
@@ -62,7 +67,7 @@ class _Stage:
         self.lag = 2.0 * np.pi * parameters.amplifier.bandwidth
         self.position = positions('at', at, parameters.machine)
         self.state = np.zeros(10)
-        self.state[::2] = self.position
+        self.state[::2], self.state[1::2] = self.position, speed
         i_d, i_q, possible = exact_currents(
             true_machine(parameters), self.position[None], -self.arrays.constant[None]
         )
@@ -75,15 +80,16 @@ class _Stage:
         found: FloatArray = _rates(self.arrays.block, time, state, current)
         return found
 
-    def slopes(self) -> tuple[FloatArray, FloatArray]:
-        """Of the rates by state (10, 10) and by current (10, 8)."""
+    def slopes(self, flowing: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
+        """Of the rates by state (10, 10) and by current (10, 8), where currents (8,) flow."""
+        there = self.current if flowing is None else flowing
         return (
-            _slopes(lambda state: self.rates(0.0, state, self.current), self.state),
-            _slopes(lambda current: self.rates(0.0, self.state, current), self.current),
+            slopes(lambda state: self.rates(0.0, state, there), self.state),
+            slopes(lambda current: self.rates(0.0, self.state, current), there),
         )
 
 
-def _slopes(function: Callable[[FloatArray], FloatArray], at: FloatArray) -> FloatArray:
+def slopes(function: Callable[[FloatArray], FloatArray], at: FloatArray) -> FloatArray:
     """Derivatives (m, n) of a function of (n,) that gives (m,)."""
     steps = _STEP * np.eye(at.size)
     columns = [(function(at + step) - function(at - step)) / (2.0 * _STEP) for step in steps]
@@ -95,7 +101,7 @@ def hover_currents(parameters: PlantParameters | None = None, at: ArrayLike = HO
 
     Raises ParameterError where there are none.
     """
-    return _Stage(a_table(PlantParameters, parameters, 'plant'), at).current
+    return StageAt(a_table(PlantParameters, parameters, 'plant'), at).current
 
 
 def nonlinear_plant(parameters: PlantParameters | None = None) -> control.NonlinearIOSystem:
@@ -109,7 +115,7 @@ def nonlinear_plant(parameters: PlantParameters | None = None) -> control.Nonlin
     """
     with needed('control', 'nonlinear_plant'):
         import control
-    stage = _Stage(a_table(PlantParameters, parameters, 'plant'), HOVER)
+    stage = StageAt(a_table(PlantParameters, parameters, 'plant'), HOVER)
     lag = stage.lag
 
     def update(time: float, state: FloatArray, current: FloatArray, _: object) -> FloatArray:
@@ -159,7 +165,7 @@ def linearise(
     with needed('control', 'linearise'):
         import control
     given = a_table(PlantParameters, parameters, 'plant')
-    stage = _Stage(given, at)
+    stage = StageAt(given, at)
     if axis is not None:
         table = a_table(ControllerParameters, controller, 'controller')
         loop = _axis_loop(stage, given, table, axis)
@@ -198,13 +204,25 @@ class _Loop(NamedTuple):
 
 
 def _axis_loop(
-    stage: _Stage, given: PlantParameters, controller: ControllerParameters, axis: str
+    stage: StageAt, given: PlantParameters, controller: ControllerParameters, axis: str
 ) -> _Loop:
     if axis not in AXES:
         raise ParameterError(f"'axis' is '{axis}', it must be one of {', '.join(AXES)}")
     index = AXES.index(axis)
     if not controller.axes[index].controlled:
         raise ParameterError(f"parameter '{axis}.controlled' is false: there is no such loop")
+    law = linear_law(given, controller)
+    sampled, driven = _sampled_axis(stage, controller.sample_time, index)
+    inverse = inverse_slopes(stage, controller)
+    row = stage.slopes(inverse.flowing)[1][2 * index + 1]
+    stiffness, gain = float(row @ inverse.by_output[:, index]), float(row @ inverse.by_w[:, index])
+    return _closed(
+        law.design(controller, axis), controller, (sampled, driven), (stiffness, gain), axis
+    )
+
+
+def linear_law(given: PlantParameters, controller: ControllerParameters) -> ControlLaw:
+    """The law of a controller for a plant; raises ParameterError where it is no linear one."""
     if given.sample_time != controller.sample_time:
         raise ParameterError(
             f"parameter 'sample_time' of the plant is {given.sample_time:g} s, the controller's is "
@@ -215,14 +233,10 @@ def _axis_loop(
         raise ParameterError(
             f"parameter 'law' is '{controller.law}', an object: it has no linear model"
         )
-    sampled, driven = _sampled_axis(stage, controller.sample_time, index)
-    stiffness, gain = _inverse_slopes(stage, controller, index)
-    return _closed(
-        law.design(controller, axis), controller, (sampled, driven), (stiffness, gain), axis
-    )
+    return law
 
 
-def _sampled_axis(stage: _Stage, period: float, index: int) -> tuple[FloatArray, FloatArray]:
+def _sampled_axis(stage: StageAt, period: float, index: int) -> tuple[FloatArray, FloatArray]:
     """An axis between two samples: position, rate and, with a lag, the acceleration that flows.
 
     Driven by the acceleration that the currents are to make, and by a disturbance.
@@ -235,28 +249,35 @@ def _sampled_axis(stage: _Stage, period: float, index: int) -> tuple[FloatArray,
     return discretise(state, np.array([[0.0, 0.0], [0.0, 1.0], [stage.lag, 0.0]]), period)
 
 
-def _inverse_slopes(
-    stage: _Stage, controller: ControllerParameters, index: int
-) -> tuple[float, float]:
-    """What the inverse's currents make of the axis: acceleration by position [1/s²], and by w."""
+class InverseSlopes(NamedTuple):
+    """A controller's inverse linearised: its currents by the outputs and by w, (8, 5) each.
+
+    ``flowing`` (8,) are those with which the stage does not accelerate.
+    """
+
+    by_output: FloatArray
+    by_w: FloatArray
+    flowing: FloatArray
+
+
+def inverse_slopes(stage: StageAt, controller: ControllerParameters) -> InverseSlopes:
+    """The inverse of a controller where a stage is."""
     currents = inverse_of(controller, NO_LIMITS)
-    controlled = [axis.controlled for axis in controller.axes]
+    free = np.flatnonzero([axis.controlled for axis in controller.axes])
 
     def made(wanted: FloatArray) -> FloatArray:
         return stage.rates(0.0, stage.state, currents(stage.position, wanted))[1::2]
 
-    free = np.flatnonzero(controlled)
     wanted = np.zeros(5)
     for _ in range(_NEWTON):
         wanted[free] -= np.linalg.lstsq(
-            _slopes(made, wanted)[np.ix_(free, free)], made(wanted)[free], rcond=None
+            slopes(made, wanted)[np.ix_(free, free)], made(wanted)[free], rcond=None
         )[0]
-    flowing = currents(stage.position, wanted)
-    by_current = _slopes(lambda current: stage.rates(0.0, stage.state, current), flowing)
-    row = by_current[2 * index + 1]
-    by_output = _slopes(lambda output: currents(output, wanted), stage.position)[:, index]
-    by_input = _slopes(lambda w: currents(stage.position, w), wanted)[:, index]
-    return float(row @ by_output), float(row @ by_input)
+    return InverseSlopes(
+        slopes(lambda output: currents(output, wanted), stage.position),
+        slopes(lambda w: currents(stage.position, w), wanted),
+        currents(stage.position, wanted),
+    )
 
 
 def _closed(

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from maglev_model.axes import AXES
+from maglev_model.paper import STEPS, TRACKING, PublishedStep
 from maglev_monitor.bag.analysis import Analysis
 from maglev_monitor.metrics.curves import StepCurves
 from maglev_monitor.metrics.readable import micro
@@ -28,7 +29,6 @@ from maglev_monitor.report.drawing import (
     to_plot,
 )
 from maglev_monitor.report.scales import FLOOR, TITLES, units
-from maglev_study.paper import STEPS, TRACKING, PublishedStep
 
 Runs = Mapping[str, Mapping[str, Analysis]]
 """Analyses by scenario, then by the name of the controller for the legend."""

@@ -1,7 +1,7 @@
 """``paper_tables FOLDER``: the paper's experiments, its figures beside a simulation's. No ROS here.
 
-The folder holds a folder of runs for each controller, named as in :data:`CONTROLLERS`, with a run
-for each scenario in it: ``paper/steps``, ``ours/ellipse`` and so on.
+The folder holds a folder of runs for each law and plant, named as in :data:`CASES`, with a run for
+each of its scenarios in it: ``paper/steps``, ``ours/ellipse`` and so on.
 """
 
 from __future__ import annotations
@@ -16,85 +16,107 @@ from typing import Any, NamedTuple, NoReturn
 
 from maglev_model.axes import AXES
 from maglev_model.command import leave_with
+from maglev_model.paper import SCENARIOS, STEPS, TRACKING, WINDOW, PublishedStep
 from maglev_monitor.bag.analysis import Analysis, analyse
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.metrics.readable import angle_or_length, micro, seconds
-from maglev_study.paper import SCENARIOS, STEPS, TRACKING, WINDOW, PublishedStep
 
-CONTROLLERS = {'paper': "the paper's law, simulated", 'ours': 'ours, simulated'}
-"""Folders of runs, and what their controllers are called."""
+ELLIPSES = tuple(TRACKING)
+CASES: Mapping[str, tuple[str, tuple[str, ...]]] = {
+    'paper': ("the paper's law", SCENARIOS),
+    'ours': ('ours', SCENARIOS),
+    'paper_rough': ("the paper's law, rough plant", ELLIPSES),
+    'ours_rough': ('ours, rough plant', SCENARIOS),
+    'paper_shaped': ("the paper's law, shaped steps", ('steps',)),
+}
+"""Folders of runs, what law and plant they are of, and the scenarios that are flown."""
 
-HEADS = ('', "the paper's machine", *CONTROLLERS.values())
+COLUMNS = tuple(CASES)[:4]
+"""Those that have a column of their own; shaped steps stand below the raw ones."""
+DRAWN = ('paper', 'ours')
+HEADS = ('', "the paper's machine", *(CASES[case][0] for case in COLUMNS))
+STEP_ROWS: Mapping[str, tuple[str, ...]] = {
+    'steps as jumps: overshoot, t_s, t_enc': ('paper', '', '', ''),
+    'steps rounded off over 0.2 s, likewise': ('paper_shaped', 'ours', '', 'ours_rough'),
+}
+"""Of each block of steps, the cases whose figures stand in :data:`COLUMNS`."""
 PASS, NOT_PASSED, NOTHING = 0, 1, 2
 
 _UNKNOWN = '–'
 _NOTES = (
     "The paper's machine: its own figures, measured with its encoders; with < or > the limits of "
     'its Table III.',
+    'Errors are mean |e| and, after the comma, the largest.',
     "The paper's law: its regulator (14) to (17) and published poles; with the exact inverse in "
     "place of (12), which with Table I's values misses more than the paper measured.",
-    'Both are simulated on the benchmark plant: the full model (6), (7), 10 µm encoders, 7 A '
-    "amplifiers, and guide friction fitted to the paper's errors. Errors are those of the true "
-    'position, in a step against its target.',
-    "The paper's law is given jumps, as on the machine; our steps are rounded off within 0.2 s. "
-    'Times count from the first sample of the step for both.',
+    'The first two are simulated on the benchmark plant: the full model (6), (7), 10 µm encoders, '
+    "7 A amplifiers, and guide friction fitted to the paper's errors. Those beside fly the rough "
+    'plant, params/rough.yaml, and are told its delay, modes and voltage.',
+    "Errors are those on the encoders' own scales, which on the benchmark plant are the truth; in "
+    'a step against its target.',
+    "The paper's law is given jumps, as on the machine; below, steps rounded off over 0.2 s and "
+    'their acceleration, as ours always are. Times count from the first sample of the step.',
     't_s is the time after which |e| stays below 0.1 mm or 0.1 mrad, t_enc that after which it '
     'stays within 10 µm or 20 µrad: going there and leaving again does not count.',
 )
 
 
 class Run(NamedTuple):
-    """One run of a controller: figures and analysis, None where there are none; what is wrong."""
+    """One run of a case: figures and analysis, None where there are none; what is wrong."""
 
-    controller: str
+    case: str
     scenario: str
     result: dict[str, Any] | None
     analysis: Analysis | None
     problem: str
 
 
-def load_run(folder: Path, controller: str, scenario: str) -> Run:
-    """Read the run ``folder/controller/scenario``; what cannot be read becomes its problem."""
-    path = folder / controller / scenario
+def load_run(folder: Path, case: str, scenario: str) -> Run:
+    """Read the run ``folder/case/scenario``; what cannot be read becomes its problem."""
+    path = folder / case / scenario
     try:
         result = json.loads((path / 'metrics.json').read_text(encoding='utf-8'))
         problem = '' if result['verdict'] == 'pass' else _failure(result)
     except OSError:
-        return Run(
-            controller, scenario, None, None, 'it has not finished: there is no metrics.json'
-        )
+        return Run(case, scenario, None, None, 'it has not finished: there is no metrics.json')
     except (ValueError, KeyError, TypeError):
-        return Run(controller, scenario, None, None, 'its metrics.json is damaged')
+        return Run(case, scenario, None, None, 'its metrics.json is damaged')
+    problem = problem or _missing(scenario, result)
+    if case not in DRAWN:
+        return Run(case, scenario, result, None, problem)
     try:
         analysis = analyse(path)
     except BagError as error:
-        return Run(controller, scenario, result, None, problem or str(error))
-    problem = problem or ''.join(analysis.notes[:1]) or _missing(scenario, result)
-    return Run(controller, scenario, result, analysis, problem)
+        return Run(case, scenario, result, None, problem or str(error))
+    problem = problem or ''.join(analysis.notes[:1])
+    return Run(case, scenario, result, analysis, problem)
 
 
 def rows(runs: Sequence[Run]) -> Iterator[tuple[str, ...]]:
     """The lines of the table, cell by cell, as :data:`HEADS`; a heading is a line of one cell."""
-    found = {(run.controller, run.scenario): run.result for run in runs}
+    found = {(run.case, run.scenario): run.result for run in runs}
     for scenario, published in TRACKING.items():
-        results = [found.get((controller, scenario)) for controller in CONTROLLERS]
-        yield (f'{published.title}: mean |e| over {_windows(results)}',)
+        results = [found.get((case, scenario)) for case in COLUMNS]
+        yield (f'{published.title}: mean, largest |e| over {_windows(results)}',)
         for axis in AXES:
             given = published.mean_error.get(axis)
+            if given is not None:
+                yield axis, _as_published(axis, given), *(_errors(r, axis) for r in results)
+    for title, cases in STEP_ROWS.items():
+        yield (title,)
+        results = [found.get((case, 'steps')) for case in cases]
+        for step in STEPS:
+            ends = (angle_or_length(step.axis, value) for value in (step.start, step.target))
+            start, target = ends
+            published_step = f'{step.overshoot}, {step.settling_time}, {step.encoder_time}'
             yield (
-                axis,
-                _UNKNOWN if given is None else _as_published(axis, given),
-                *(_mean_error(result, axis) for result in results),
+                f'{step.axis}, {start.split()[0]} → {target}',
+                published_step if 'paper' in cases else '',
+                *(
+                    _step_cell(result, step) if case else ''
+                    for case, result in zip(cases, results, strict=True)
+                ),
             )
-    yield ('steps: overshoot, t_s, t_enc',)
-    results = [found.get((controller, 'steps')) for controller in CONTROLLERS]
-    for step in STEPS:
-        start, target = (angle_or_length(step.axis, value) for value in (step.start, step.target))
-        yield (
-            f'{step.axis}, {start.split()[0]} → {target}',
-            f'{step.overshoot}, {step.settling_time}, {step.encoder_time}',
-            *(_step_cell(result, step) for result in results),
-        )
 
 
 def markdown(runs: Sequence[Run]) -> str:
@@ -115,7 +137,7 @@ def render(runs: Sequence[Run]) -> str:
     for run in runs:
         if run.analysis is not None:
             named = analyses.setdefault(run.scenario, {})
-            named[CONTROLLERS[run.controller]] = run.analysis
+            named[CASES[run.case][0]] = run.analysis
     failed = [_problem_line(run) for run in runs if run.problem]
     title = "The paper's experiments"
     parts = [
@@ -138,12 +160,12 @@ def paper_tables(arguments: Sequence[str] | None = None) -> int:
     """
     options = _parser().parse_args(arguments)
     runs = [
-        load_run(options.folder, controller, scenario)
-        for scenario in SCENARIOS
-        for controller in CONTROLLERS
+        load_run(options.folder, case, scenario)
+        for case, (_, scenarios) in CASES.items()
+        for scenario in scenarios
     ]
     if all(run.result is None for run in runs):
-        example = options.folder / next(iter(CONTROLLERS)) / SCENARIOS[0]
+        example = options.folder / next(iter(CASES)) / SCENARIOS[0]
         return _error(f"there is no finished run in '{options.folder}', such as '{example}'")
     out = options.out or options.folder
     text = markdown(runs)
@@ -173,7 +195,7 @@ def _parser() -> argparse.ArgumentParser:
         type=Path,
         metavar='FOLDER',
         help='with runs in it: '
-        + ', '.join(f'{name}/{SCENARIOS[0]}' for name in CONTROLLERS)
+        + ', '.join(f'{case}/{names[0]}' for case, (_, names) in CASES.items())
         + ' and so on',
     )
     parser.add_argument(
@@ -213,7 +235,7 @@ def _missing(scenario: str, result: Mapping[str, Any]) -> str:
 
 
 def _find(result: Mapping[str, Any], step: PublishedStep) -> Mapping[str, Any] | None:
-    for found in result['steps']:
+    for found in result['own_steps'] or result['steps']:
         if found['axis'] == step.axis and all(
             abs(found[key] - value) < 1e-9
             for key, value in (('from', step.start), ('to', step.target))
@@ -235,8 +257,13 @@ def _two_digits(time: float | None) -> str:
     return seconds(time) if time is None else f'{time:.2f} s'
 
 
-def _mean_error(result: Mapping[str, Any] | None, axis: str) -> str:
-    return micro(axis, None if result is None else result['axes'][axis]['mean_abs_error'])
+def _errors(result: Mapping[str, Any] | None, axis: str) -> str:
+    """Mean and largest |e|, in one unit."""
+    found = {} if result is None else (result['own_axes'] or result['axes'])[axis]
+    mean, largest = found.get('mean_abs_error'), found.get('max_abs_error')
+    if mean is None or largest is None:
+        return _UNKNOWN
+    return f'{1e6 * mean:.1f}, {micro(axis, largest)}'
 
 
 def _as_published(axis: str, value: float) -> str:
@@ -260,14 +287,14 @@ def _header_words(runs: Sequence[Run]) -> Iterator[str]:
 
 
 def _problem_line(run: Run) -> str:
-    return f'{CONTROLLERS[run.controller]}, {run.scenario}: {run.problem}'
+    return f'{CASES[run.case][0]}, {run.scenario}: {run.problem}'
 
 
 def _run_rows(runs: Sequence[Run]) -> Iterator[list[str]]:
     for run in runs:
         if run.result is not None:
             yield [
-                f'{run.controller}/{run.scenario}',
+                f'{run.case}/{run.scenario}',
                 run.result['verdict'],
                 run.result['mode'],
                 f'{run.result["duration"]:g} s',

@@ -19,17 +19,18 @@ from scipy.optimize import least_squares
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import MeasurementFault, Regulator
 from maglev_model.axes import AXES, THETA, FloatArray
+from maglev_model.paper import TRACKING
 from maglev_model.parameters import from_yaml, replace
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
 from maglev_study.closed_loop import run
-from maglev_study.paper import TRACKING
 from maglev_study.references import HOVER, References, ellipse, held, joined
 
 PARAMS = Path(__file__).resolve().parents[3] / 'params'
 PERIOD = 1e-3
 STEP = 'theta 10 mrad: overshoot'
 _MEASURED, _RUN_IN, _REST, _STEP = 20.0, 15.0, 8.0, 10.0  # [s]
+_MOST_FRICTION = 2.9  # that the plant's two steps a sample bear [m/s^2, rad/s^2]
 _TITLES = {'ellipse': '3DOF', 'ellipse_4dof': '4DOF'}
 
 PUBLISHED: Mapping[str, float] = {
@@ -56,7 +57,8 @@ class Candidate(NamedTuple):
 
 
 def _friction(f_y: float, f_x: float, f_z: float, f_tilt: float) -> dict[str, object]:
-    return {'guide.coulomb': tuple(float(max(f, 0.0)) for f in (f_y, f_x, f_z, f_tilt, f_tilt))}
+    levels = np.clip((f_y, f_x, f_z, f_tilt, f_tilt), 0.0, _MOST_FRICTION)
+    return {'guide.coulomb': tuple(levels.tolist())}
 
 
 def _guides(p: FloatArray) -> dict[str, object]:

@@ -17,11 +17,11 @@ from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import MeasurementFault, Regulator
 from maglev_model.axes import FloatArray
 from maglev_model.parameters import from_yaml, replace
+from maglev_monitor.metrics.repeatability import Repeatability, repeatability
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
 from maglev_study.closed_loop import Run, run
 from maglev_study.references import HOVER, References, ellipse, held, joined, scan, shaped
-from maglev_study.repeatability import Repeatability, repeatability
 
 THETA = 0.010
 """Amplitude of the ellipse in 4DOF [rad]."""
@@ -32,6 +32,10 @@ SPEEDS = (0.001, 0.002, 0.005)
 HUNTING = np.array([3e-6, 3e-6, 3e-6, 15e-6, 15e-6])
 """Rms movement about its mean from which on a hold is said to hunt [m, rad]."""
 
+FRICTIONS = ('lugre', 'coulomb', 'tanh')
+"""Of the guides of machines that are drawn, in turn."""
+
+_ASIDE = 0.002  # centre of mass of these [m]
 _SETTLE, _RUN_IN = 3.0, 10.0  # [s]
 _SCAN_WAY = np.array([0.001, 0.005, 0.005, 0.0, 0.0])  # to each side [m, rad]
 _SCAN_SHARE = np.array([0.2, 1.0, 1.0, 0.0, 0.0])  # of the speed
@@ -156,12 +160,18 @@ def judged(experiment: Experiment, outcome: Run, period: float) -> Outcome:
     return Outcome(experiment.name, Errors.of(true), Errors.of(own), Errors.of(measured))
 
 
-def laws(params: Path) -> dict[str, ControllerParameters]:
-    """The default law, and the paper's on the exact inverse, from the folder of parameters."""
-    files = [params / name for name in ('controller.yaml', 'paper.yaml', 'paper_exact.yaml')]
+def laws(params: Path, *overlays: str) -> dict[str, ControllerParameters]:
+    """The default law, and the paper's on the exact inverse, from the folder of parameters.
+
+    Both are told what the overlays, by name, say of the machine.
+    """
+    names = {
+        'default law': ('controller', *overlays),
+        "paper's law": ('controller', 'paper', 'paper_exact', *overlays),
+    }
     return {
-        'default law': from_yaml(ControllerParameters, 'controller', files[0]),
-        "paper's law": from_yaml(ControllerParameters, 'controller', *files),
+        law: from_yaml(ControllerParameters, 'controller', *(params / f'{n}.yaml' for n in files))
+        for law, files in names.items()
     }
 
 
@@ -170,3 +180,20 @@ def plant_of(params: Path, *overlays: str, **overrides: object) -> PlantParamete
     files = [params / f'{name}.yaml' for name in ('machine', 'benchmark', *overlays)]
     named: Mapping[str, object] = {k.replace('__', '.'): v for k, v in overrides.items()}
     return replace(from_yaml(PlantParameters, 'plant', *files), named)
+
+
+def machines(params: Path, count: int) -> Iterator[PlantParameters]:
+    """Rough plants, drawn from seed 0 on: motors, phases and amplifiers as ``rough.yaml`` says.
+
+    The centre of mass is 2 mm aside whichever way; the frictions take turns.
+    """
+    for seed in range(count):
+        way = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi)
+        yield plant_of(
+            params,
+            'rough',
+            seed=seed,
+            effects__friction__model=FRICTIONS[seed % len(FRICTIONS)],
+            effects__balance__aside_x=_ASIDE * float(np.cos(way)),
+            effects__balance__aside_z=_ASIDE * float(np.sin(way)),
+        )

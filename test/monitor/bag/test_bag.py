@@ -28,6 +28,7 @@ from rosbags.interfaces import (
 )
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 
+from maglev_model.progress import Progress
 from maglev_monitor.bag.analysis import analyse
 from maglev_monitor.bag.chunk_file import ChunkFile
 from maglev_monitor.bag.errors import BagError
@@ -382,3 +383,21 @@ def test_reading_knows_a_whole_file(bag: Path) -> None:
 
 def test_python_ignores_the_file_size_signal() -> None:
     assert signal.getsignal(signal.SIGXFSZ) == signal.SIG_IGN
+
+
+def test_the_bar_of_what_is_read_ends(
+    bag: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys.stdout, 'isatty', lambda: True)
+    monkeypatch.setattr('maglev_model.progress._AFTER', 0.0)
+    monkeypatch.setattr('maglev_model.progress._REDRAWN', 0.0)
+    for _ in Bag(bag, Progress('read', '%', lines=False)).batches():
+        pass
+    bars = capsys.readouterr().out.split('\r\033[K')
+    assert len(bars) > 2
+    assert bars[-1].startswith('read [########################] 100 %')
+    assert bars[-1].endswith('\n')
+    next(Bag(bag, Progress('read', '%', lines=False)).batches())
+    left_early = capsys.readouterr().out
+    assert '100 %' not in left_early
+    assert left_early.endswith('\n')

@@ -16,6 +16,7 @@ from scipy.io import loadmat
 import maglev_monitor
 from maglev_model.axes import AXES
 from maglev_model.optional import MissingLibraryError
+from maglev_model.progress import Progress
 from maglev_monitor.bag.columns import COLUMNS, FIRST, NONE, Table, table
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.export import FORMATS, write
@@ -54,6 +55,18 @@ def test_the_columns_are_the_runs(whole: Table, run: Any) -> None:
     assert whole.units['virtual_input_theta'] == 'rad/s^2'
     assert whole.units['true_velocity_x'] == 'm/s'
     assert whole.notes == ()
+
+
+def test_how_far_the_text_is_written_is_told(whole: Table, tmp_path: Path) -> None:
+    told: list[tuple[float, float]] = []
+
+    class Told(Progress):
+        def tell(self, done: float, wanted: float, words: str = '') -> None:
+            told.append((done, wanted))
+
+    write(whole, tmp_path / 'run.csv', 'csv', Told('export', '%'))
+    length = len(whole.columns['sample'])
+    assert told[-1] == (length, length)
 
 
 def test_what_a_bag_does_not_hold(
@@ -134,7 +147,7 @@ def test_npz_and_mat(bag: Path, whole: Table, tmp_path: Path) -> None:
 
 
 def test_parquet(bag: Path, whole: Table, tmp_path: Path) -> None:
-    parquet = pytest.importorskip('pyarrow.parquet', reason='pyarrow is no part of the set-up')
+    parquet = pytest.importorskip('pyarrow.parquet', reason='pyarrow comes with the test tools')
     found = parquet.read_table(exported(bag, tmp_path, 'parquet'))
     assert found.column_names == NAMES
     assert found.schema.field('error_y').metadata[b'unit'] == b'm'
@@ -168,7 +181,7 @@ def test_a_data_frame_in_one_line(bag: Path, whole: Table) -> None:
     ('library', 'why'),
     [
         ('pandas', 'read needs pandas: pip install pandas'),
-        ('pyarrow', 'the format parquet needs pyarrow: pip install pyarrow'),
+        ('pyarrow', "the format parquet needs pyarrow: pip install 'pyarrow<26'"),
     ],
 )
 def test_a_library_that_is_not_there_is_named(

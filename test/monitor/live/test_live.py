@@ -105,5 +105,6 @@ def test_figures_as_people_read_them(axis: str, value: float, text: str) -> None
 def test_what_was_not_reached_is_said() -> None:
     assert seconds(None) == 'never'
     assert seconds(2.0) == '2.000 s'
+    assert micro('x', -4e-8) == '0.0 µm'
     assert micro('y', None) == '–'
     assert micro('theta', 1e-5) == '10.0 µrad'

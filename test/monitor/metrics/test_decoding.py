@@ -70,6 +70,7 @@ def test_former_messages_lack_what_was_added(run: Any) -> None:
     added_since = {
         'measurement': {'wall_time', 'lockstep', 'controller'},
         'controller': {'limited_by'},
+        'plant': {'own_length'},
     }
     for key, added in added_since.items():
         records = decode(key, [former.message(run, key, n) for n in range(3)])

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from made_up_run import TOPICS, Encoder, make_run
+from made_up_run import OWN, TOPICS, Encoder, make_run
 
 from maglev_model.axes import AXES
 from maglev_model.parameters import build
@@ -62,6 +62,38 @@ def test_tracking_errors(run: Any, records: dict[str, Records]) -> None:
     assert found['verdict'] == 'pass'
     assert found['samples'] == np.count_nonzero(np.isin(run.phase, (Phase.TRACK, Phase.STEP)))
     assert found['duration'] == pytest.approx(found['samples'] * 1e-3)
+
+
+def test_errors_on_the_encoders_own_scales_and_the_verdict_by_them(
+    records: dict[str, Records],
+) -> None:
+    plain = figures(records)
+    true, own = plain['axes']['x'], plain['own_axes']['x']
+    assert own['bias'] == pytest.approx(true['bias'] + OWN, rel=1e-6)
+    records['plant'] = records['plant'].copy()
+    records['plant']['own_length'][:, 4] += 1e-3
+    found = figures(records)
+    assert found['axes'] == plain['axes']
+    own = found['own_axes']['x']
+    assert own['bias'] == pytest.approx(true['bias'] + OWN + 1e-3, rel=1e-6)
+    assert own['max_abs_error'] > 1e-3
+    for limit, verdict in ((own['mean_abs_error'] + 1e-9, 'pass'), (1e-3, 'fail')):
+        limits = with_limits(max_mean_error=(-1.0, limit, -1.0, -1.0, -1.0))
+        assert figures(records, limits)['verdict'] == verdict
+    # The steps were within 1 mm on the true scale, and still are: x does not step.
+    assert [step['axis'] for step in found['own_steps']] == ['y', 'theta']
+    for step, there in zip(found['own_steps'], found['steps'], strict=True):
+        assert step['overshoot_percent'] == pytest.approx(there['overshoot_percent'], abs=0.1)
+
+
+def test_where_only_counts_are_known_half_a_count_more_is_allowed(
+    records: dict[str, Records],
+) -> None:
+    del records['plant']
+    largest = figures(records)['axes']['x']['max_abs_error']
+    for less, verdict in ((4.9e-6, 'pass'), (5.1e-6, 'fail')):
+        limits = with_limits(max_error=(-1.0, largest - less, -1.0, -1.0, -1.0))
+        assert figures(records, limits)['verdict'] == verdict
 
 
 def test_without_the_true_state_errors_are_of_the_measured_position(
@@ -299,6 +331,8 @@ def test_figures_are_those_of_former_messages(run: Any, records: dict[str, Recor
     assert found['currents'].pop('saturated_by') == {'current': 0, 'levitation': 0}
     wanted = figures(records)
     del wanted['currents']['saturated_by']
+    assert found.pop('own_axes') is found.pop('own_steps') is None
+    assert wanted.pop('own_axes')['x']['bias'] != wanted.pop('own_steps')
     assert found == wanted
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import re
 import shutil
@@ -57,6 +58,9 @@ def test_report_is_self_contained(bag: Path, tmp_path: Path, capsys: Any) -> Non
     assert [title for title in titles if title not in ('Tracking errors', 'Limits')][1:] == charts
     assert page.count('data-root-id=') == 10 + 4 + 10 + 3 + 3 + 8 + 2
     assert 'made_up' in page
+    assert 'Flown on 20' in page
+    assert '<td>14.3 %, &lt; 3 s, about 5 s</td>' in page
+    assert "the paper's machine: mean |e|" not in html.unescape(page)
     printed = capsys.readouterr().out
     found = json.loads((tmp_path / 'metrics.json').read_text())
     assert as_text(found) in printed
@@ -68,12 +72,20 @@ def test_report_is_self_contained(bag: Path, tmp_path: Path, capsys: Any) -> Non
 def test_report_goes_beside_the_bag_and_keeps_the_live_metrics(bag: Path, tmp_path: Path) -> None:
     folder = tmp_path / 'run'
     shutil.copytree(bag, folder / 'bag')
+    told = {'command': 'ellipse.sh --params=a&b.yaml', 'software': '7.1, abc-dirty'}
+    metadata = folder / 'bag' / 'metadata.yaml'
+    text = metadata.read_text().replace('custom_data: null', f'custom_data: {json.dumps(told)}')
+    metadata.write_text(text)
+    (folder / 'replay.html').write_text('')
     (folder / 'metrics.json').write_text('live')
     (folder / 'params').mkdir()
     lines = f'{DIFFERS}fan: 7 (by default 2)\n{DIFFERS}effective_parameters: no news\nplant:\n'
     (folder / 'params' / 'plant.yaml').write_text(lines)
     assert analyze([str(folder / 'bag')]) == PASS
     page = (folder / 'report.html').read_text(encoding='utf-8')
+    assert '<a href="replay.html">' in page
+    assert 'Flown by ellipse.sh --params=a&amp;b.yaml on 20' in page
+    assert 'UTC with 7.1, abc-dirty.' in page
     assert '<tr><td>plant</td><td>fan: 7 (by default 2)</td></tr>' in page
     assert 'no news' not in page
     assert (folder / 'metrics.json').read_text() == 'live'
@@ -120,6 +132,7 @@ def test_no_bag_is_one_clear_line(tmp_path: Path, capsys: Any) -> None:
     assert captured.err == f"analyze: error: there is no bag '{tmp_path / 'nothing'}'\n"
 
 
+@pytest.mark.usefixtures('no_plots')
 def test_an_output_that_cannot_be_written_is_one_clear_line(
     bag: Path, tmp_path: Path, capsys: Any
 ) -> None:

@@ -62,9 +62,15 @@ def test_a_run_is_the_same_by_its_seed_and_from_a_file(
     path.write_text(json.dumps([to_json(scenario(seed))]), encoding='utf-8')
     said = []
     for which in (str(seed), str(path)):
-        assert main(['--replay', which, '--out', str(tmp_path)]) in (PASS, BROKEN)
-        said.append(capsys.readouterr().out)
+        code = main(['--replay', which, '--json', '--out', str(tmp_path)])
+        captured = capsys.readouterr()
+        said.append(captured.err)
+        outcome = json.loads(captured.out)
+        assert code == (PASS if outcome['passed'] else BROKEN)
+        assert outcome['seed'] == seed
+        assert bool(outcome['broken']) != outcome['passed']
     assert said[0] == said[1]
+    assert 'ms after the beginning' in said[0]
     page = (tmp_path / f'run-{seed}.html').read_text(encoding='utf-8')
     assert 'data:image/png' in page
     assert 'What happened' in page

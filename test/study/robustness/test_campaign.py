@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import json
 import shutil
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -17,6 +19,7 @@ from maglev_model.axes import AXES
 from maglev_model.optional import MissingLibraryError
 from maglev_model.parameters import ParameterError, from_yaml
 from maglev_plant.parameters import PlantParameters
+from maglev_study.robustness import fleet, guarantee
 from maglev_study.robustness.draw import NOMINAL
 from maglev_study.robustness.experiments import experiments
 from maglev_study.robustness.fleet import JOURNAL, Campaign, Plan, fly_plan, make_plan
@@ -24,14 +27,16 @@ from maglev_study.robustness.fly import FLOWN, LOST, Flown, fly
 from maglev_study.robustness.main import DONE, INTERRUPTED, WRONG_USE, main
 from maglev_study.robustness.outcome import Group, groups, influence, worst
 from maglev_study.robustness.page import render, survivors
+from maglev_study.robustness.table import write_table
 
 PARAMS = Path(__file__).resolve().parents[3] / 'params'
+EXPERIMENTS = ('ellipse', 'step_theta')
 
 
 @pytest.fixture(scope='module')
 def plan() -> Plan:
-    """The nominal machine and two drawn ones, under the default law."""
-    return make_plan(PARAMS, 2)
+    """The nominal machine and two drawn ones, under the default law, through little."""
+    return make_plan(PARAMS, 2, names=EXPERIMENTS)
 
 
 @pytest.fixture(scope='module')
@@ -91,13 +96,14 @@ def heard_all(heard: list[tuple[int, int]]) -> Any:
     [
         ({'seed': 1}, 'holds a campaign whose seed is 0'),
         ({'laws': ['paper']}, r"whose laws is \['default'\]"),
+        ({'names': ['ellipse']}, r"whose experiments is \['ellipse', 'step_theta'\]"),
     ],
 )
 def test_a_folder_of_another_campaign_is_refused(
     change: dict[str, Any], words: str, whole: tuple[Campaign, Path]
 ) -> None:
     with pytest.raises(ParameterError, match=words):
-        fly_plan(make_plan(PARAMS, 2, **change), whole[1])
+        fly_plan(make_plan(PARAMS, 2, **{'names': EXPERIMENTS, **change}), whole[1])
 
 
 def test_other_parameters_and_other_files_are_refused(
@@ -106,10 +112,10 @@ def test_other_parameters_and_other_files_are_refused(
     over = tmp_path / 'over.yaml'
     over.write_text('plant: {ros__parameters: {offset: {K_h: 1.01}}}\n')
     with pytest.raises(ParameterError, match='whose plant of default is'):
-        fly_plan(make_plan(PARAMS, 2, overlays=[over]), whole[1])
+        fly_plan(make_plan(PARAMS, 2, names=EXPERIMENTS, overlays=[over]), whole[1])
     over.write_text('robustness: {ros__parameters: {factor: {magnets: {width: 0.0}}}}\n')
     with pytest.raises(ParameterError, match='whose distributions is'):
-        fly_plan(make_plan(PARAMS, 2, overlays=[over]), whole[1])
+        fly_plan(make_plan(PARAMS, 2, names=EXPERIMENTS, overlays=[over]), whole[1])
     (tmp_path / JOURNAL).write_text('[]\n')
     with pytest.raises(ParameterError, match='is no campaign'):
         fly_plan(make_plan(PARAMS, 2), tmp_path)
@@ -117,9 +123,8 @@ def test_other_parameters_and_other_files_are_refused(
 
 def test_figures_are_those_of_the_flight(plan: Plan, whole: tuple[Campaign, Path]) -> None:
     campaign = whole[0]
-    names = [one.name for one in experiments(1e-3)]
     assert [(one.machine, one.experiment) for one in campaign.flown] == [
-        (machine, name) for machine in range(3) for name in names
+        (machine, name) for machine in range(3) for name in EXPERIMENTS
     ]
     for one in campaign.flown:
         assert one.verdict == FLOWN
@@ -135,7 +140,8 @@ def test_a_machine_that_no_current_can_carry_is_lost(plan: Plan) -> None:
     heavy = dataclasses.replace(
         drawn.plant, offset=dataclasses.replace(drawn.plant.offset, mass_y=9.0)
     )
-    found = fly(dataclasses.replace(drawn, plant=heavy), plan.contestants[0])
+    found = fly(dataclasses.replace(drawn, plant=heavy), plan.contestants[0], EXPERIMENTS)
+    assert [one.experiment for one in found] == list(EXPERIMENTS)
     assert {one.verdict for one in found} == {LOST}
     assert 'the platen meets a stop' in found[0].reason
     assert np.isnan(found[0].mean).all()
@@ -195,13 +201,19 @@ def test_an_interrupted_campaign_is_called_incomplete(
 
 
 def test_the_page_and_the_command(
-    whole: tuple[Campaign, Path], tmp_path: Path, capsys: Any
+    whole: tuple[Campaign, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
 ) -> None:
+    monkeypatch.setattr(guarantee, 'GAPS', (0.02, 0.025))
+    monkeypatch.setattr(guarantee, 'SETS', 2)
     shutil.copy(whole[1] / JOURNAL, tmp_path)
     call = ['--params', str(PARAMS), '--machines', '2', '--jobs', '1', '--out', str(tmp_path)]
-    assert main(call) == DONE
-    said = capsys.readouterr().out
-    assert 'robustness: 3 of 3 flown' in said
+    assert main([*call, '--json', '--experiment', *EXPERIMENTS]) == DONE
+    captured = capsys.readouterr()
+    assert 'robustness: 3 of 3 flown' in captured.err
+    outcome = json.loads(captured.out)
+    assert outcome['passed'] is True
+    assert outcome['survivors']['ellipse'] == {'default': '2 of 2'}
+    assert str(tmp_path / 'robustness.html') in outcome['files']
     page = (tmp_path / 'robustness.html').read_text(encoding='utf-8')
     told = worst(groups(whole[0]), 'default')
     assert told is not None
@@ -211,19 +223,43 @@ def test_the_page_and_the_command(
         '47.0',
         'Errors over time: ellipse',
         'Distributions',
+        'Guaranteed margins over the range',
+        'machines 1 to 2 are guaranteed ±',
         'Which parameter matters',
         'offset.spring_theta',
         'remanence within a grade',
     ):
         assert words in page
-    if (tmp_path / 'machines.csv').is_file():
-        with (tmp_path / 'machines.csv').open(encoding='utf-8') as file:
-            rows = list(csv.DictReader(file))
-        assert len(rows) == len(whole[0].flown)
-        for row, one in zip(rows, whole[0].flown, strict=True):
-            assert (int(row['machine']), row['experiment']) == (one.machine, one.experiment)
-            assert [float(row[f'mean_{axis}']) for axis in AXES] == one.mean.tolist()
-        assert float(rows[-1]['offset.mass_y']) != 1.0
+
+
+def test_the_table_holds_every_figure(
+    whole: tuple[Campaign, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    parquet = pytest.importorskip('pyarrow.parquet', reason='pyarrow comes with the test tools')
+    path, note = write_table(whole[0], tmp_path)
+    assert (path.name, note) == ('machines.parquet', '')
+    table = parquet.read_table(path).to_pydict()
+    monkeypatch.setitem(sys.modules, 'pyarrow', None)
+    path, note = write_table(whole[0], tmp_path)
+    assert path.name == 'machines.csv'
+    assert "pip install 'pyarrow<26'" in note
+    with path.open('r', encoding='utf-8') as file:
+        rows = list(csv.DictReader(file))
+    assert list(table) == list(rows[0])
+    assert len(rows) == len(whole[0].flown)
+    for number, (row, one) in enumerate(zip(rows, whole[0].flown, strict=True)):
+        assert (int(row['machine']), row['experiment']) == (one.machine, one.experiment)
+        assert [float(row[f'mean_{axis}']) for axis in AXES] == one.mean.tolist()
+        assert [table[f'peak_{axis}'][number] for axis in AXES] == one.peak.tolist()
+    assert table['offset.mass_y'][-1] == float(rows[-1]['offset.mass_y']) != 1.0
+
+
+def test_a_campaign_of_other_code_is_refused(
+    plan: Plan, whole: tuple[Campaign, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(fleet, 'sources_digest', lambda: 'other')
+    with pytest.raises(ParameterError, match=r"whose code is .*, this one's is 'other'"):
+        fly_plan(plan, whole[1])
 
 
 def test_a_machine_is_written_for_the_graph(plan: Plan, tmp_path: Path) -> None:
@@ -240,6 +276,7 @@ def test_a_machine_is_written_for_the_graph(plan: Plan, tmp_path: Path) -> None:
     ('arguments', 'words'),
     [
         (['--law', 'ours'], "there is no law 'ours'"),
+        (['--experiment', 'step'], "there is no experiment 'step', there are: ellipse, forces,"),
         (['--overlay', 'none.yaml'], 'cannot read parameter file'),
     ],
 )
@@ -255,19 +292,15 @@ def test_wrong_use_is_told_in_a_line(
 def test_a_scheduler_without_dask_is_told_what_to_install(
     plan: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import sys
-
     monkeypatch.setitem(sys.modules, 'distributed', None)
     with pytest.raises(MissingLibraryError, match='--scheduler needs distributed: pip install'):
         fly_plan(plan, tmp_path, scheduler='tcp://localhost:1')
 
 
 def test_ctrl_c_leaves_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from maglev_study.robustness import main as command
-
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(command._Progress, '__call__', interrupted)
+    monkeypatch.setattr('maglev_model.progress.Progress.tell', interrupted)
     assert main(['--params', str(PARAMS), '--jobs', '1', '--out', str(tmp_path)]) == INTERRUPTED
     assert 'incomplete' in (tmp_path / 'robustness.html').read_text(encoding='utf-8')

@@ -82,8 +82,12 @@ class Driver(Protocol):
 class Truthful(Protocol):
     """A driver of boards that are not real also tells what is behind a sample."""
 
-    def truth(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """True x1..x10 (10,) at the sample read last, and i_d, then i_q flowing (8,) [A]."""
+    def truth(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """The truth at the sample read last.
+
+        x1..x10 (10,); i_d, then i_q flowing (8,) [A]; and how much more than whole counts the
+        encoders' scales have (6,) [m].
+        """
         ...
 
 

@@ -42,10 +42,10 @@ class EmulatedDriver(QuanserDriver):
         super().start()
         self._first = self.boards.ticks
 
-    def truth(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def truth(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """The truth behind the sample read last, even where it was read late; see the protocol."""
         row = self.boards.past[(self._first + self._ticks) % len(self.boards.past)].copy()
-        return row[:10], row[10:]
+        return row[:10], row[10:18], row[18:]
 
 
 class EmulatedBoards:
@@ -87,7 +87,7 @@ class EmulatedBoards:
         self.lines = Lines(parameters)
         self.expired = np.zeros(2, dtype=bool)
         self._held = self.rig.counts()
-        self.past = np.zeros((parameters.boards.buffer + 2, 18))
+        self.past = np.zeros((parameters.boards.buffer + 2, 24))
         self._delay = 0
         self._inject = parameters.emulation.inject
         wiring = parameters.emulation.wiring
@@ -117,27 +117,35 @@ class EmulatedBoards:
 
     def now(self) -> float:
         """The boards' time; in real time the machine's, less what they stood still [s]."""
-        return self._clock() - self._stood_still if self.realtime else self.ticks * self.period
+        self.catch_up()  # what it stopped in front of this, too, has stood still
+        return self._moved() if self.realtime else self.ticks * self.period
+
+    def _moved(self) -> float:
+        """By the clock, less what the boards are known to have stood still [s]."""
+        return self._clock() - self._stood_still
 
     def tick(self) -> None:
         """One sample passes."""
         self._inject_faults()
-        enabled = self.lines.enabled
         rest = self.rig.state[::2] if self.dummy_loads else None
-        self.rig.advance(self.volts[self._outputs] if enabled else self._no_current)
+        self.rig.advance(self.outputs() if self.lines.enabled else self._no_current)
         if rest is not None:
             self.rig.place(rest)
         self.ticks += 1
-        row = self.past[self.ticks % len(self.past)]
-        row[:10], row[10:] = self.rig.state, self.rig.stage.command
         self._count()
-        for card in self.cards.values():
+        self.rig.tell(self.past[self.ticks % len(self.past)])
+        for card in list(self.cards.values()):
             card.on_tick()
+
+    def outputs(self) -> NDArray[np.float64]:
+        """What the amplifiers of the phases are asked for, shape (12,) [V]."""
+        volts: NDArray[np.float64] = self.volts[self._outputs]
+        return volts
 
     def catch_up(self) -> None:
         """In real time, let pass what has passed; what long stops the bridge stops the boards."""
         if self.realtime:
-            behind = int((self.now() - self._started) / self.period) - self.ticks
+            behind = int((self._moved() - self._started) / self.period) - self.ticks
             still = max(0, behind - self._longest - self._delay)
             self._stood_still += still * self.period
             self._delay = 0
@@ -155,7 +163,7 @@ class EmulatedBoards:
         self.catch_up()
         if self.ticks > passed:
             return
-        ahead = self._started + (self.ticks + 1) * self.period - self.now()
+        ahead = self._started + (self.ticks + 1) * self.period - self._moved()
         if ahead > 0.0:
             self._sleep(ahead)
         self.catch_up()

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maglev_model.parameters import DIFFERS, ParameterError
+from maglev_model.progress import Progress
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.reader import Bag
 from maglev_monitor.metrics.curves import RunCurves
@@ -21,6 +22,9 @@ from maglev_monitor.metrics.run_parameters import (
     RunParameters,
     run_from_json,
 )
+
+_NO_NEWS = ('effective_parameters:', 'command:')
+"""Parameters that are said elsewhere, or say nothing of a run."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,14 +38,16 @@ class Analysis:
     notes: list[str]
     changes: list[tuple[str, str]]
     """Node, and a parameter of it that was not as by default, with both values."""
+    custom: dict[str, str]
+    """What the bag says of itself besides, by name: ``software``, ``command``."""
 
 
-def analyse(path: Path) -> Analysis:
-    """Read a bag and compute its figures.
+def analyse(path: Path, progress: Progress | None = None) -> Analysis:
+    """Read a bag and compute its figures; how far it is read, ``progress`` is told.
 
     Raises :class:`~.errors.BagError` when there is no bag, or nothing of a run in it.
     """
-    bag = Bag(path)
+    bag = Bag(path, progress)
     run = run_parameters(bag)
     metrics, curves, joiner = RunMetrics(run), RunCurves(run), Joiner()
     for batch in bag.batches():
@@ -57,7 +63,8 @@ def analyse(path: Path) -> Analysis:
     if not metrics.started:
         raise BagError(f"the bag '{bag.path}' holds no run: the reference never left REST")
     result, changes = metrics.result(), _changes(bag.path.resolve().parent / 'params')
-    return Analysis(result, curves, run, metrics.tick_histogram, list(bag.notes), changes)
+    notes, custom = list(bag.notes), bag.custom()
+    return Analysis(result, curves, run, metrics.tick_histogram, notes, changes, custom)
 
 
 def _changes(folder: Path) -> list[tuple[str, str]]:
@@ -65,8 +72,9 @@ def _changes(folder: Path) -> list[tuple[str, str]]:
     changes = []
     for file in sorted(folder.glob('*.yaml')):
         for line in file.read_text(encoding='utf-8', errors='replace').splitlines():
-            if line.startswith(DIFFERS) and not line.startswith(f'{DIFFERS}effective_parameters'):
-                changes.append((file.stem, line.removeprefix(DIFFERS)))
+            change = line.removeprefix(DIFFERS)
+            if change != line and not change.startswith(_NO_NEWS):
+                changes.append((file.stem, change))
     return changes
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from maglev_model.axes import AXES, UNITS
 from maglev_model.geometry import outputs_of_gaps
+from maglev_model.progress import Progress
 from maglev_monitor.bag.analysis import run_parameters
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.reader import Bag
@@ -23,7 +24,8 @@ from maglev_monitor.metrics.decoding import Records, stamps
 NONE = -1
 """What a column of whole numbers holds at a sample whose message is missing; others hold NaN."""
 
-_OUTPUT = 'output'  # no field of a message: the outputs y, x, z, phi, theta of the six encoders
+# No fields of a message: the outputs y, x, z, phi, theta of the six encoders, and of their scales
+_OUTPUT, _OWN = 'output', 'own_output'
 
 
 class Column(NamedTuple):
@@ -72,6 +74,7 @@ COLUMNS: tuple[Column, ...] = (
         'internal_model', "the internal model's part of w", 'controller', 'internal_model', '/s^2'
     ),
     *_by_axis('true', 'where it truly was', 'plant', 'state', at=(0, 2)),
+    *_by_axis('own', "as the encoders' own scales have it, between counts", 'plant', _OWN),
     *_by_axis('true_velocity', 'its true velocity', 'plant', 'state', '/s', at=(1, 2)),
     *_by_motor('true_direct_current', 'A', 'i_d that flowed', 'plant', 'direct_current'),
     *_by_motor('true_quadrature_current', 'A', 'i_q that flowed', 'plant', 'quadrature_current'),
@@ -99,12 +102,12 @@ class Table:
     notes: tuple[str, ...]
 
 
-def table(path: str | Path) -> Table:
-    """The run in a bag: a run's folder, a bag, or a bag's file.
+def table(path: str | Path, progress: Progress | None = None) -> Table:
+    """The run in a bag: a run's folder, a bag, or a bag's file; ``progress`` is told of it.
 
     Raises :class:`~.errors.BagError` when there is no bag, or nothing of a run in it.
     """
-    bag = Bag(Path(path))
+    bag = Bag(Path(path), progress)
     run = run_parameters(bag)
     records = _records(bag)
     if not records:
@@ -117,9 +120,12 @@ def table(path: str | Path) -> Table:
     outputs = _outputs(records, run.machine.radius)
     for column in COLUMNS:
         part = records.get(column.topic)
-        if part is None or column.field not in (*(part.dtype.names or ()), _OUTPUT):
+        if column.field in outputs:
+            values = outputs[column.field]
+        elif part is not None and column.field in (part.dtype.names or ()):
+            values = part[column.field]
+        else:
             continue
-        values = outputs if column.field == _OUTPUT else part[column.field]
         if column.element is not None:
             values = values[:, column.element]
         found[column.name] = _spread(values, rows[column.topic], len(samples))
@@ -182,11 +188,15 @@ def _period(records: dict[str, Records], otherwise: float) -> float:
     return otherwise
 
 
-def _outputs(records: dict[str, Records], radius: float) -> NDArray[np.float64]:
-    part = records.get('measurement')
-    if part is None:
-        return np.empty((0, 5))
-    return outputs_of_gaps(part['gap'], part['x'], part['z'], radius)
+def _outputs(records: dict[str, Records], radius: float) -> dict[str, NDArray[np.float64]]:
+    found = {}
+    if 'measurement' in records:
+        part = records['measurement']
+        found[_OUTPUT] = outputs_of_gaps(part['gap'], part['x'], part['z'], radius)
+    if 'plant' in records and 'own_length' in (records['plant'].dtype.names or ()):
+        own = records['plant']['own_length']
+        found[_OWN] = outputs_of_gaps(own[:, :4], own[:, 4], own[:, 5], radius)
+    return found
 
 
 def _spread(values: NDArray[Any], rows: NDArray[np.int64], count: int) -> NDArray[Any]:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from maglev_model.command import leave_with
+from maglev_model.progress import Progress
 from maglev_monitor.bag.compare import TopicComparison, compare
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.reader import Bag
@@ -26,7 +27,8 @@ def compare_bags(arguments: Sequence[str] | None = None) -> int:
     """
     options = _parser().parse_args(arguments)
     try:
-        bags = (Bag(options.first), Bag(options.second))
+        progress = Progress('compare_bags', '%', lines=False)  # of one: both are read in step
+        bags = (Bag(options.first, progress), Bag(options.second))
         comparisons = compare(
             bags, options.topics, tolerance=options.tolerance, wall_clock=options.wall_clock
         )

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from maglev_model.optional import needed
+from maglev_model.progress import Progress
 from maglev_monitor.bag.columns import Table, table
 
 _ROWS = 10_000  # of text that is made at once
@@ -35,15 +36,15 @@ def read(path: str | Path) -> Any:
     return frame
 
 
-def write(found: Table, path: Path, form: str) -> list[Path]:
+def write(found: Table, path: Path, form: str, progress: Progress | None = None) -> list[Path]:
     """Write a run, or another table, in one of :data:`FORMATS`; returns the files.
 
-    They take their place when whole. Raises OSError where it cannot be written, and
-    :class:`MissingLibraryError`.
+    They take their place when whole; how far csv is, which takes long, ``progress`` is told. Raises
+    OSError where it cannot be written, and :class:`MissingLibraryError`.
     """
     partial = path.with_name(path.name + '.tmp')
     try:
-        FORMATS[form](found, partial)
+        FORMATS[form](found, partial, progress)
         partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)
@@ -62,7 +63,7 @@ def _described(found: Table) -> str:
     return text.getvalue()
 
 
-def _csv(found: Table, path: Path) -> None:
+def _csv(found: Table, path: Path, progress: Progress | None) -> None:
     """Numbers that read back exactly, nothing where there is none."""
     with path.open('w', encoding='utf-8') as file:
         file.write(','.join(found.columns) + '\n')
@@ -70,6 +71,8 @@ def _csv(found: Table, path: Path) -> None:
         for first in range(0, length, _ROWS):
             texts = [_texts(column[first : first + _ROWS]) for column in found.columns.values()]
             file.writelines(','.join(row) + '\n' for row in zip(*texts, strict=True))
+            if progress:
+                progress.tell(min(first + _ROWS, length), length)
 
 
 def _texts(values: Any) -> list[str]:
@@ -80,7 +83,7 @@ def _texts(values: Any) -> list[str]:
     return [str(value) for value in values.tolist()]
 
 
-def _npz(found: Table, path: Path) -> None:
+def _npz(found: Table, path: Path, _: Progress | None) -> None:
     """The columns, and ``names``, ``units`` and ``descriptions`` in their order."""
     content: dict[str, Any] = {**found.columns, 'names': list(found.columns)}
     content['units'] = list(found.units.values())
@@ -89,7 +92,7 @@ def _npz(found: Table, path: Path) -> None:
         np.savez_compressed(file, **content)
 
 
-def _mat(found: Table, path: Path) -> None:
+def _mat(found: Table, path: Path, _: Progress | None) -> None:
     """The columns as column vectors, and the structs ``units`` and ``descriptions``."""
     from scipy.io import savemat
 
@@ -98,9 +101,9 @@ def _mat(found: Table, path: Path) -> None:
         savemat(file, content, do_compression=True, oned_as='column')
 
 
-def _parquet(found: Table, path: Path) -> None:
+def _parquet(found: Table, path: Path, _: Progress | None) -> None:
     """The columns, each with its unit and description in its field's metadata."""
-    with needed('pyarrow', 'the format parquet'):
+    with needed('pyarrow', 'the format parquet', '<26'):  # later ones need NumPy 2
         import pyarrow
         import pyarrow.parquet
     fields = [
@@ -116,7 +119,7 @@ def _parquet(found: Table, path: Path) -> None:
     pyarrow.parquet.write_table(whole, path)
 
 
-FORMATS: dict[str, Callable[[Table, Path], None]] = {
+FORMATS: dict[str, Callable[[Table, Path, Progress | None], None]] = {
     'csv': _csv,
     'parquet': _parquet,
     'mat': _mat,

@@ -10,6 +10,7 @@ from typing import NoReturn
 
 from maglev_model.command import leave_with
 from maglev_model.optional import MissingLibraryError
+from maglev_model.progress import Progress
 from maglev_monitor.bag.columns import table
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.export import FORMATS, write
@@ -25,8 +26,9 @@ def export(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     out = options.out or _beside(options.bag).with_suffix(f'.{options.format}')
     try:
-        found = table(options.bag)
-        files = write(found, out, options.format)
+        found = table(options.bag, Progress('export: read', '%', lines=False))
+        written = Progress('export: written', '%', lines=False)
+        files = write(found, out, options.format, written)
     except (BagError, MissingLibraryError) as error:
         return _failed(str(error))
     except OSError as error:

@@ -47,14 +47,15 @@ class TopicMessages(NamedTuple):
 class McapFile:
     """An mcap file that is read from front to back.
 
-    After :meth:`chunks` is exhausted, ``complete`` tells whether the file ended as it should, and
-    ``damage`` what was wrong otherwise.
+    ``position`` is how many of its bytes have been read. After :meth:`chunks` is exhausted,
+    ``complete`` tells whether the file ended as it should, and ``damage`` what was wrong otherwise.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.complete = False
         self.damage = ''
+        self.position = 0
         self._schemas: dict[int, str] = {}
         self._channels: dict[int, tuple[str, str]] = {}
         self._messages: dict[int, list[bytes]] = {}  # by channel, since they were handed out
@@ -71,6 +72,7 @@ class McapFile:
             except _CUT_OFF as error:
                 raise NoMcapError(f"'{self.path}' is no mcap file") from error
             for record in self._records(file):
+                self.position = file.tell()
                 if isinstance(record, Chunk):
                     self._break_up(record)
                 else:

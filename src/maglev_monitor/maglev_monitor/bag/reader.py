@@ -9,10 +9,12 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import yaml
 from rosbags.rosbag2 import Reader
 from rosbags.rosbag2.errors import ReaderError
 from rosbags.typesys import Stores, get_typestore
 
+from maglev_model.progress import Progress
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.mcap_file import McapFile, TopicMessages
 from maglev_monitor.metrics.decoding import KEY_OF_MESSAGE_TYPE, Records, decode
@@ -43,18 +45,30 @@ class Bag:
     """A bag that is read from front to back.
 
     :param path: folder of a run, folder of a bag, or one file of a bag.
+    :param progress: is told of each batch how much of the files has been read.
     :raises BagError: when there is no bag at ``path``.
 
     After :meth:`batches` is exhausted, ``notes`` says in plain lines what was wrong with the bag,
     and ``counts`` holds the messages read by topic.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, progress: Progress | None = None) -> None:
         self.path, self.files = _find(path)
+        self._progress = progress
         self.notes: list[str] = []
         self.counts: dict[str, int] = {}
         self._topics: dict[str, str] = {}  # by key
         self._typestore = get_typestore(Stores.ROS2_JAZZY)
+
+    def custom(self) -> dict[str, str]:
+        """What the bag says of itself besides, by name; nothing where it is cut off."""
+        try:
+            text = (self.path / 'metadata.yaml').read_text(encoding='utf-8', errors='replace')
+            loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+            found = yaml.load(text, loader)['rosbag2_bagfile_information']['custom_data'] or {}
+            return {str(name): str(value) for name, value in found.items() if value}
+        except (OSError, yaml.YAMLError, KeyError, TypeError, AttributeError):
+            return {}
 
     def batches(self) -> Iterator[Batch]:
         """The bag's content in the order it was written. Raises :class:`BagError`."""
@@ -67,6 +81,9 @@ class Bag:
                 yield self._batch(messages)
         except (OSError, ValueError, ReaderError) as error:
             raise BagError(f"cannot read the bag '{self.path}': {error}") from error
+        finally:
+            if self._progress:
+                self._progress.end()
         if not self.counts:
             raise BagError(f"the bag '{self.path}' holds no message")
 
@@ -74,11 +91,14 @@ class Bag:
         if self._needs_rosbags():
             yield from self._read_by_rosbags()
             return
+        sizes = [path.stat().st_size for path in self.files]
         for number, path in enumerate(self.files):
             file = McapFile(path)
             recovered = 0
             for messages in file.chunks():
                 recovered += sum(len(topic.data) for topic in messages)
+                if self._progress:
+                    self._progress.tell(sum(sizes[:number]) + file.position, sum(sizes))
                 yield messages
             if not file.complete:
                 self.notes.append(
@@ -86,6 +106,8 @@ class Bag:
                 )
             elif number == 0 and self.path.is_dir() and not (self.path / 'metadata.yaml').is_file():
                 self.notes.append(f"'{self.path}' has no metadata.yaml: read without it")
+        if self._progress:
+            self._progress.tell(1, 1)  # what is no message lies behind them
 
     def _needs_rosbags(self) -> bool:
         """Whether only rosbags reads this kind of bag: sqlite3, or compressed as a whole."""

@@ -22,6 +22,7 @@ from rosbags.interfaces import (
 )
 
 from maglev_model.parameters import parameter
+from maglev_model.revision import revision
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.log_time import LogTimes
 from maglev_monitor.bag.writer import BagWriter
@@ -56,6 +57,7 @@ class RecorderParameters(NodeParameters):
 
     output: str = parameter('bag', "the bag's folder, which must not exist yet")
     compress: bool = parameter(True, 'compress the chunks of the bag with zstd')
+    command: str = parameter('', 'by what the run was started, for the bag')
     flush_period: float = parameter(
         1.0, 'what a kill can cost at most', unit='s', within=(0.05, 60.0)
     )
@@ -69,7 +71,10 @@ class RecorderNode(MaglevNode[RecorderParameters]):
     def __init__(self) -> None:
         super().__init__('recorder', RecorderParameters)
         self._writer = BagWriter(
-            Path(self.parameters.output), message_folder, compress=self.parameters.compress
+            Path(self.parameters.output),
+            message_folder,
+            compress=self.parameters.compress,
+            custom={'software': revision(), 'command': self.parameters.command},
         )
         self._open()
         self._taps: dict[str, PolledSubscription] = {

@@ -26,11 +26,12 @@ class Topic:
 
 
 def bag_information(
-    file_name: str, topics: Sequence[Topic], first: int, last: int
+    file_name: str, topics: Sequence[Topic], first: int, last: int, custom: Mapping[str, str]
 ) -> dict[str, Any]:
     """``rosbag2_bagfile_information`` of a bag with one mcap file.
 
-    ``first`` and ``last`` are the least and the greatest time of reception [ns].
+    ``first`` and ``last`` are the least and the greatest time of reception [ns]; ``custom`` is what
+    ``ros2 bag record --custom-data`` would be given.
     """
     span = {
         'starting_time': {'nanoseconds_since_epoch': first},
@@ -58,7 +59,7 @@ def bag_information(
         'compression_format': '',  # chunks are the file's own matter
         'compression_mode': '',
         'files': [{'path': file_name, **span}],
-        'custom_data': None,
+        'custom_data': dict(custom) or None,
         'ros_distro': _DISTRIBUTION,
     }
 

@@ -6,7 +6,7 @@ import contextlib
 import errno
 import os
 import shutil
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import IO, cast
 
@@ -30,10 +30,19 @@ class BagWriter:
     :param path: folder of the bag, made by :meth:`open`; must not exist.
     :param find_messages: where the .msg files of packages lie that are not ROS's own.
     :param compress: compress the chunks with zstd.
+    :param custom: what else the bag shall say of itself, by name.
     """
 
-    def __init__(self, path: Path, find_messages: FindMessages, *, compress: bool = False) -> None:
+    def __init__(
+        self,
+        path: Path,
+        find_messages: FindMessages,
+        *,
+        compress: bool = False,
+        custom: Mapping[str, str] | None = None,
+    ) -> None:
         self.path = path
+        self._custom = custom or {}
         self._compression = CompressionType.ZSTD if compress else CompressionType.NONE
         self._definitions = Definitions(find_messages)
         self._schemas: dict[str, int] = {}
@@ -152,7 +161,7 @@ class BagWriter:
         file.keep()
         topics = list(self._topics.values())
         first = self._first if any(topic.count for topic in topics) else 0
-        information = bag_information(file.path.name, topics, first, self._last)
+        information = bag_information(file.path.name, topics, first, self._last, self._custom)
         self._mcap.add_metadata('rosbag2', {'serialized_metadata': as_yaml(information)})
         self._mcap.finish()  # type: ignore[no-untyped-call]
         temporary = self.path / 'metadata.yaml.tmp'

@@ -30,7 +30,7 @@ class WatchParameters(RunParameters):
         60.0, 'longest wait for the run to begin; 0: for ever', unit='s', lower=0.0
     )
     timeout: float = parameter(
-        10.0, 'longest silence of stage, controller or reference', unit='s', lower=0.1
+        20.0, 'longest silence of stage, controller or reference', unit='s', lower=0.1
     )
     fault_grace: float = parameter(
         3.0, 'how long a run is watched on after a fault', unit='s', lower=0.0

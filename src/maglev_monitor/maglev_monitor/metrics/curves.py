@@ -31,6 +31,7 @@ COLUMNS = {
 otherwise; ``phase_current`` is the largest magnitude among a motor's three phases [A], ``tick`` the
 wall-clock time since the sample before [s]."""
 
+_DRAWN = ('true', 'measured')
 _TAIL = 3000  # tracking samples kept one by one
 _MOST_STEPS = 40
 _STEP_BINS = 1200
@@ -55,6 +56,8 @@ class RunCurves:
     def __init__(self, run: RunParameters) -> None:
         self.whole_run = Envelope(_width())
         self.steps: list[StepCurves] = []
+        self.begun: int | None = None
+        """When the first sample was measured, by the wall clock since the epoch [ns]."""
         self._machine = run.machine
         self._tail_parts: list[tuple[NDArray[np.int64], FloatArray]] = []
         self._segment: int | None = None
@@ -92,9 +95,10 @@ class RunCurves:
         wanted = np.where((rows['phase'] == Phase.STEP)[:, None], rows['target'], rows['reference'])
         wanted[~referenced] = np.nan
         position = positions(rows, self._machine.radius)
-        for index, source in enumerate(SOURCES):
-            values[:, COLUMNS[source]] = position[:, index]
-            values[:, COLUMNS[f'{source}_error']] = position[:, index] - wanted
+        for source in _DRAWN:
+            found = position[:, SOURCES.index(source)]
+            values[:, COLUMNS[source]] = found
+            values[:, COLUMNS[f'{source}_error']] = found - wanted
         driven = rows['has_currents']
         for name in ('direct_current', 'quadrature_current'):
             values[driven, COLUMNS[name]] = rows[name][driven]
@@ -112,6 +116,8 @@ class RunCurves:
     def _ticks(self, rows: Records) -> FloatArray:
         if not len(rows):
             return np.zeros(0)
+        if self.begun is None:
+            self.begun = int(rows['stamp'][0])
         sequence = np.concatenate([[self._previous[0]], rows['sequence']])
         stamp = np.concatenate([[self._previous[1]], rows['stamp']])
         self._previous = (int(sequence[-1]), int(stamp[-1]))

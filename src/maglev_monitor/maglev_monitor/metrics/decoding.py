@@ -103,6 +103,7 @@ TOPIC_TYPES = {
                 Field('direct_current', '<f8', 4),
                 Field('quadrature_current', '<f8', 4),
                 Field('thermal_load', '<f8', 4),
+                Field('own_length', '<f8', 6, added=1),
             ),
         ),
     )

@@ -10,23 +10,29 @@ from maglev_monitor.metrics.decoding import Records
 
 FloatArray = NDArray[np.float64]
 
-SOURCES = ('true', 'measured')
-"""Where positions come from, in the order of :func:`positions`."""
+SOURCES = ('true', 'measured', 'own')
+"""Whose position it is, in the order of :func:`positions`.
+
+*true* is the rigid platen's, *measured* what the encoders count, *own* what the scales of the
+encoders have it to be, zeros and all, between the counts: what a law can be judged by.
+"""
 
 _OUTPUT_STATES = [0, 2, 4, 6, 8]  # x1, x3, x5, x7, x9 of Table II
 
 
 def positions(rows: Records, radius: float) -> FloatArray:
-    """Outputs by source (true, measured) [m, rad], NaN where unknown, shape (n, 2, 5).
+    """Outputs by source (true, measured, own) [m, rad], NaN where unknown, shape (n, 3, 5).
 
     ``radius`` is r of (5) [m]. Gaps that no tilt can make give NaN tilts.
     """
-    outputs = np.full((len(rows), 2, 5), np.nan)
+    outputs = np.full((len(rows), len(SOURCES), 5), np.nan)
     plant = rows['has_plant']
     outputs[plant, 0] = rows['state'][plant][:, _OUTPUT_STATES]
     measured = rows['has_measurement']
     some = rows[measured]
     outputs[measured, 1] = outputs_of_gaps(some['gap'], some['x'], some['z'], radius)
+    own = rows['own_length']
+    outputs[:, 2] = outputs_of_gaps(own[:, :4], own[:, 4], own[:, 5], radius)
     return outputs
 
 

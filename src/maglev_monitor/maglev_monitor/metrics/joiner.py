@@ -26,7 +26,11 @@ _COLUMNS: dict[str, tuple[tuple[str, str], ...]] = {
         ('quadrature_current', 'quadrature_current'),
     ),
     'controller': (('saturated', 'saturated'), ('limited_by', 'limited_by'), ('mode', 'mode')),
-    'plant': (('state', 'state'), ('thermal_load', 'thermal_load')),
+    'plant': (
+        ('state', 'state'),
+        ('thermal_load', 'thermal_load'),
+        ('own_length', 'own_length'),
+    ),
 }
 
 
@@ -53,7 +57,8 @@ ROW = _row_type()
 
 ``sequence``; ``stamp`` and ``stage_time`` of the measurement, by the wall clock and by the stage's
 [ns], the same in bags from before the stage had one; ``has_<topic>`` and the columns of each topic
-(all zero where the topic has no message for this sample).
+(all zero where the topic has no message for this sample, but NaN ``own_length`` where none tells
+it).
 """
 
 
@@ -143,6 +148,7 @@ class Joiner:
         if block is None:
             block = np.zeros(self._size, ROW)
             block['sequence'] = number * self._size + np.arange(self._size)
+            block['own_length'] = np.nan
             self._pending[number] = block
         return block
 

@@ -26,7 +26,8 @@ def micro(axis: str, value: float | None) -> str:
     """An error of an axis [m or rad] in µm or µrad, one digit behind the point."""
     if value is None:
         return '–'
-    return f'{value * 1e6:.1f} µ{"rad" if axis in _TILTS else "m"}'
+    shown = round(value * 1e6, 1) + 0.0  # not -0.0
+    return f'{shown:.1f} µ{"rad" if axis in _TILTS else "m"}'
 
 
 def saturation(currents: Mapping[str, Any]) -> str:

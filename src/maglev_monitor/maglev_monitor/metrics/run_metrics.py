@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from maglev_model.axes import AXES
 from maglev_model.phases import Phase
 from maglev_model.plugins import find_plugin
+from maglev_monitor.metrics.arrivals import Arrivals
 from maglev_monitor.metrics.decoding import TOPIC_TYPES, Records
 from maglev_monitor.metrics.derived import SOURCES, phase_currents, positions
 from maglev_monitor.metrics.faults import Faults, Instant
@@ -31,6 +32,7 @@ FloatArray = NDArray[np.float64]
 LIMITS = {'current': 1, 'levitation': 2}
 """What limits currents, as bits of ControllerState's ``limited_by``."""
 
+_TRUE, _MEASURED, _OWN = (SOURCES.index(source) for source in ('true', 'measured', 'own'))
 _OPTIONAL = ('controller', 'plant')  # a stage or controller may do without
 _TICK_RESOLUTION = 1e-6  # of the tick histogram [s]
 _TICK_BINS = 200_000
@@ -46,7 +48,8 @@ class Metric(Protocol):
     def add(self, rows: Records, position: FloatArray) -> None:
         """Take the run's next rows (n,) of :data:`.joiner.ROW`, in order.
 
-        ``position`` (n, 2, 5): true and measured outputs [m, rad], NaN where unknown.
+        ``position`` (n, 3, 5): outputs, true, measured and on the encoders' own scales [m, rad],
+        NaN where unknown.
         """
 
     def result(self) -> Mapping[str, float | None]:
@@ -67,6 +70,8 @@ class RunMetrics:
         self._holes = {key: Holes() for key in TOPIC_TYPES}
         self._last_reference = -1  # number of the last sample with one
         self._tracking = _Tracking()
+        self._arrivals = Arrivals(run.metrics.sample_time)
+        self._has_own = False  # whether the stage tells what its encoders' own scales have
         self._measured_samples = 0
         self._steps: list[StepTracker] = []
         self._segment: int | None = None
@@ -122,7 +127,7 @@ class RunMetrics:
 
     def result(self) -> dict[str, Any]:
         """The content of ``metrics.json``; complete only when the run has reached its end."""
-        run, source = self._run, 0 if self._seen['plant'] else 1
+        run, source = self._run, _TRUE if self._seen['plant'] else _MEASURED
         sample_time = run.metrics.sample_time
         figures: dict[str, Any] = {
             'scenario': run.scenario,
@@ -134,15 +139,21 @@ class RunMetrics:
             **self._missing_result(),
             'error_source': SOURCES[source],
             'axes': self._tracking.result(source),
-            'measured_axes': self._tracking.result(1),
-            'steps': [entry for step in self._steps for entry in step.results(source)],
+            'measured_axes': self._tracking.result(_MEASURED),
+            'own_axes': self._tracking.result(_OWN) if self._has_own else None,
+            'steps': self._step_results(source),
+            'own_steps': self._step_results(_OWN) if self._has_own else None,
+            'repeatability': self._arrivals.result(),
             'currents': self._currents.result(),
             'timing': self._timing.result(sample_time),
             'faults': self._faults.until(self._end, sample_time),
         }
         if self._further:
             figures['further'] = {name: one.result() for name, one in self._further.items()}
-        return {**figures, **verdict(figures, run.limits, complete=self.ended)}
+        return {**figures, **verdict(figures, run, complete=self.ended)}
+
+    def _step_results(self, source: int) -> list[dict[str, Any]]:
+        return [entry for step in self._steps for entry in step.results(source)]
 
     def _missing_result(self) -> dict[str, Any]:
         """By topic; a landing after a reference that was ended is no loss of the reference."""
@@ -178,6 +189,7 @@ class RunMetrics:
             self._seen[key] += int(np.count_nonzero(present))
             self._holes[key].add(rows['sequence'][~present])
         position = positions(rows, self._run.machine.radius)
+        self._has_own = self._has_own or bool(np.isfinite(rows['own_length']).any())
         referenced = rows['has_reference']
         if np.any(referenced):
             self._last_reference = int(rows['sequence'][referenced][-1])
@@ -185,6 +197,9 @@ class RunMetrics:
         self._measured_samples += int(np.count_nonzero(measured))
         tracked = referenced & (phases == Phase.TRACK)
         self._tracking.add(position[tracked] - rows['reference'][tracked][:, None, :])
+        self._arrivals.add(
+            rows['sequence'][measured], rows['reference'][measured], position[measured]
+        )
         self._add_segments(rows[referenced], position[referenced])
         for metric in self._further.values():
             metric.add(rows, position)
@@ -219,15 +234,15 @@ class _Tracking:
     """Mean, rms and largest |e|, and the mean of e, by source and axis."""
 
     def __init__(self) -> None:
-        self._count = np.zeros(2, np.int64)
-        self._sum = np.zeros((2, 5))
-        self._signed = np.zeros((2, 5))
-        self._squares = np.zeros((2, 5))
-        self._max = np.zeros((2, 5))
+        self._count = np.zeros(len(SOURCES), np.int64)
+        self._sum = np.zeros((len(SOURCES), 5))
+        self._signed = np.zeros((len(SOURCES), 5))
+        self._squares = np.zeros((len(SOURCES), 5))
+        self._max = np.zeros((len(SOURCES), 5))
 
     def add(self, error: FloatArray) -> None:
-        """Take errors, shape (n, 2, 5), NaN where unknown [m, rad]."""
-        for source in range(2):
+        """Take errors (n, sources, 5), NaN where unknown [m, rad]."""
+        for source in range(len(SOURCES)):
             known = error[~np.isnan(error[:, source, 0]), source]
             if not len(known):
                 continue

@@ -74,8 +74,11 @@ class MetricsParameters:
 class RunLimits:
     """What a run must keep to pass."""
 
-    max_mean_error: tuple[float, ...] = _axis_limits('mean |e| over the tracking window')
-    max_error: tuple[float, ...] = _axis_limits('largest |e| over the tracking window')
+    max_mean_error: tuple[float, ...] = _axis_limits(
+        "mean |e| over the tracking window, on the encoders' own scales; where only counts are "
+        'known half of encoder_bound more'
+    )
+    max_error: tuple[float, ...] = _axis_limits('largest |e| over the tracking window, likewise')
     max_overshoot: float = _limit('overshoot of every step', '%')
     max_settling_time: float = _limit('t_s of every step', 's')
     max_encoder_time: float = _limit('t_enc of every step', 's')

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maglev_model.axes import AXES
+from maglev_monitor.metrics.derived import SOURCES
 from maglev_monitor.metrics.run_parameters import MetricsParameters
 
 FloatArray = NDArray[np.float64]
@@ -18,8 +19,8 @@ _ROUNDING = 1e-12  # a whole count of error is within a bound of one count [m, r
 class StepTracker:
     """One step from one set-point to another, on one or more axes.
 
-    Positions come with an axis for their source: index 0 the true position, 1 the measured one;
-    NaN where there is none.
+    Positions come with an axis for their source, in the order of :data:`.derived.SOURCES`; NaN
+    where there is none.
 
     :param start: set-point before the step, shape (5,).
     :param target: set-point of the step, shape (5,).
@@ -35,17 +36,17 @@ class StepTracker:
         self._bounds = np.array([settings.settling_bound, settings.encoder_bound]) + _ROUNDING
         self._direction = np.sign(target - start)
         self._first = first
-        self._last = np.full(2, first - 1)
-        self._beyond = np.zeros((2, 5))
-        self._last_outside = np.full((2, 2, 5), first - 1)  # bound, source, axis
+        self._last = np.full(len(SOURCES), first - 1)
+        self._beyond = np.zeros((len(SOURCES), 5))
+        self._last_outside = np.full((2, len(SOURCES), 5), first - 1)  # bound, source, axis
 
     def add(self, sequence: NDArray[np.int64], position: FloatArray) -> None:
-        """Take samples of the step in order: numbers, shape (n,), positions, shape (n, 2, 5)."""
+        """Take samples of the step in order: numbers, shape (n,), positions, (n, sources, 5)."""
         error = position - self._target
         beyond = np.fmax.reduce(error * self._direction, axis=0, initial=0.0)
         self._beyond = np.maximum(self._beyond, beyond)
         known = ~np.isnan(error[:, :, 0])
-        for source in range(2):
+        for source in range(len(SOURCES)):
             if known[:, source].any():
                 self._last[source] = sequence[known[:, source]][-1]
         magnitude = np.abs(error)

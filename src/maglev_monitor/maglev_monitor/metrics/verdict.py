@@ -8,19 +8,24 @@ from typing import Any
 from maglev_model.axes import AXES
 from maglev_model.parameters import values
 from maglev_monitor.metrics.readable import angle_or_length, holes, number
-from maglev_monitor.metrics.run_parameters import RunLimits
+from maglev_monitor.metrics.run_parameters import RunLimits, RunParameters
 
 _MISSING = 'number of missing samples'
 
 
-def verdict(figures: Mapping[str, Any], limits: RunLimits, *, complete: bool) -> dict[str, Any]:
+def verdict(figures: Mapping[str, Any], run: RunParameters, *, complete: bool) -> dict[str, Any]:
     """The last part of ``metrics.json``: verdict, its reasons and the limits that were checked.
 
+    Errors are those on the encoders' own scales, where the stage tells them; where it tells the
+    true position alone, of that; and where only counts are known, of these, with half a count more.
+
     :param figures: figures, as :meth:`~.run_metrics.RunMetrics.result` gathers them.
+    :param run: with the limits and the counts.
     :param complete: whether the run reached its end; otherwise it is ``incomplete`` or a failure.
     """
+    limits = run.limits
     reasons = [f'fault in {fault}' for fault in figures['faults']]
-    reasons += [*_axis_reasons(figures, limits), *_step_reasons(figures, limits)]
+    reasons += [*_axis_reasons(figures, run), *_step_reasons(figures, limits)]
     reasons += _other_reasons(figures, limits)
     if figures['faults'] or (complete and reasons):
         word = 'fail'
@@ -44,18 +49,20 @@ def checked_limits(limits: RunLimits) -> dict[str, Any]:
     return checked
 
 
-def _axis_reasons(figures: Mapping[str, Any], limits: RunLimits) -> Iterator[str]:
+def _axis_reasons(figures: Mapping[str, Any], run: RunParameters) -> Iterator[str]:
     rows = (
-        ('mean_abs_error', 'mean |e|', limits.max_mean_error),
-        ('max_abs_error', 'largest |e|', limits.max_error),
+        ('mean_abs_error', 'mean |e|', run.limits.max_mean_error),
+        ('max_abs_error', 'largest |e|', run.limits.max_error),
     )
-    tracked = figures['axes']['y']['mean_abs_error'] is not None
+    axes = figures['own_axes'] or figures['axes']
+    counts = figures['error_source'] == 'measured'
+    tracked = axes['y']['mean_abs_error'] is not None
     for name, title, bounds in rows:
-        for axis, bound in zip(AXES, bounds, strict=True):
-            value = figures['axes'][axis][name]
+        for axis, given, count in zip(AXES, bounds, run.metrics.encoder_bound, strict=True):
+            value, bound = axes[axis][name], given + 0.5 * count * counts
             if not tracked and figures['steps']:
                 continue  # a run of steps tracks nothing
-            if bound < 0 or (value is not None and value <= bound):
+            if given < 0 or (value is not None and value <= bound):
                 continue
             if value is None:
                 why = 'its gaps cannot be' if tracked else 'no tracking'
@@ -66,7 +73,7 @@ def _axis_reasons(figures: Mapping[str, Any], limits: RunLimits) -> Iterator[str
 
 
 def _step_reasons(figures: Mapping[str, Any], limits: RunLimits) -> Iterator[str]:
-    for step in figures['steps']:
+    for step in figures['own_steps'] or figures['steps']:
         axis = step['axis']
         start, target = angle_or_length(axis, step['from']), angle_or_length(axis, step['to'])
         name = f'step of {axis} from {start} to {target}'

@@ -12,9 +12,11 @@ from pathlib import Path
 from typing import NoReturn
 
 from maglev_model.command import leave_with
+from maglev_model.progress import Progress
 from maglev_monitor.bag.analysis import Analysis, analyse
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.metrics.result_file import write_metrics
+from maglev_monitor.report.page import run_folder
 from maglev_monitor.report.terminal import as_text
 
 PASS, NOT_PASSED, BAD_BAG = 0, 1, 2
@@ -29,14 +31,14 @@ def analyze(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     bags: list[Path] = [options.bag, *([options.other] if options.other else [])]
     try:
-        analyses = [analyse(bag) for bag in bags]
+        analyses = [analyse(bag, Progress('analyze', '%', lines=False)) for bag in bags]
     except BagError as error:
         print(f'analyze: error: {error}', file=sys.stderr)
         return BAD_BAG
     notes = [note for analysis in analyses for note in analysis.notes]
     for note in notes:
         print(f'analyze: {note}', file=sys.stderr)
-    folder = options.out or (Path() if options.other else _beside(options.bag))
+    folder = options.out or (Path() if options.other else run_folder(options.bag))
     try:
         page = _write(folder, bags, analyses)
     except OSError as error:
@@ -74,14 +76,6 @@ def _parser() -> argparse.ArgumentParser:
         ' two_runs.html (default: here)',
     )
     return parser
-
-
-def _beside(bag: Path) -> Path:
-    """The folder of the run: that of the bag's folder, or of its file."""
-    bag = bag.resolve()
-    if bag.is_file():
-        bag = bag.parent
-    return bag if (bag / 'bag').is_dir() else bag.parent
 
 
 def _write(folder: Path, bags: Sequence[Path], analyses: Sequence[Analysis]) -> Path:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,10 +14,12 @@ from bokeh.models import (
     CrosshairTool,
     DataRange1d,
     HoverTool,
+    Range1d,
     Span,
 )
 from bokeh.plotting import figure
 from bokeh.resources import Resources
+from bokeh.transform import dodge
 from numpy.typing import NDArray
 
 from maglev_model.phases import Phase
@@ -32,6 +34,7 @@ COLOURS = (POSITION, ERROR, SECOND, '#cc79a7', '#e69f00', '#56b4e9', REFERENCE)
 
 _INK, _GRID, _SHADE = '#7d8790', '#8b949e', '#56b4e9'
 _HEIGHT = 230  # of a panel [px]
+_LEGEND_ROOM = 0.4  # of the span of the curves, half of it above
 
 
 class Chart(NamedTuple):
@@ -126,6 +129,40 @@ def magnitude(curve: Envelope, of: Column) -> FloatArray:
     return largest
 
 
+def bars(
+    title: str, vertical: str, names: Sequence[str], groups: Mapping[str, Sequence[float]]
+) -> figure:
+    """A panel of columns, on a logarithmic scale: for each name one of each group."""
+    made = figure(
+        title=title,
+        y_axis_label=vertical,
+        x_range=list(names),
+        y_axis_type='log',
+        sizing_mode='stretch_width',
+        tools='save',
+        height=_HEIGHT,
+    )
+    _dress(made)
+    width = 0.8 / len(groups)
+    heights = [value for values in groups.values() for value in values]
+    floor = 0.1 * max(min(heights), 1e-3 * max(heights))
+    made.y_range = Range1d(floor, 10.0 * max(heights))  # with room for the legend
+    for number, (name, values) in enumerate(groups.items()):
+        place = (number + 0.5) * width - 0.4
+        made.vbar(
+            x=dodge('name', place, range=made.x_range),
+            top='value',
+            bottom=floor,
+            width=0.9 * width,
+            color=COLOURS[number],
+            legend_label=name,
+            source=ColumnDataSource({'name': list(names), 'value': list(values)}),
+        )
+    made.add_tools(HoverTool(tooltips=[('@name', '@value{0.[0]}')]))
+    legend(made)
+    return made
+
+
 def level(panel: figure, value: float, colour: str = _INK, dash: str = 'dotted') -> None:
     """A horizontal line across the panel."""
     panel.add_layout(Span(location=value, line_color=colour, line_dash=dash, line_width=1))
@@ -152,7 +189,9 @@ def shade(panel: figure, whole: Envelope, time: FloatArray) -> None:
 
 
 def legend(panel: figure, place: str = 'top_right') -> None:
-    """Show the names of the curves; a click on one hides its curve."""
+    """Show the names of the curves, clear of them; a click on one hides its curve."""
+    if isinstance(panel.y_range, DataRange1d):
+        panel.y_range.range_padding = _LEGEND_ROOM
     panel.legend.location = place
     panel.legend.click_policy = 'hide'
     panel.legend.orientation = 'horizontal'

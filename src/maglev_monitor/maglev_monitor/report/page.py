@@ -12,6 +12,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from maglev_monitor.report.drawing import Plot
 
+REPLAY = 'replay.html'
+"""What the flight in 3D is called, beside the report, where somebody has made it."""
+
 _CSS = """
 :root { color-scheme: light dark; --ink: #1d2733; --soft: #66727f; --line: #dfe4ea; --blue: #1f5fa8;
   --paper: #ffffff; }
@@ -22,7 +25,8 @@ _CSS = """
 @media print {
   :root { --ink: #000000; --soft: #444444; --line: #cccccc; --paper: #ffffff; }
   body { max-width: none; padding: 0; }
-  h2, img, .panels > div { break-inside: avoid; }
+  h2, img, tr, .caption, .panels > div { break-inside: avoid; }
+  h2, .caption { break-after: avoid; }
 }
 * { box-sizing: border-box; }
 body { font: 15px/1.55 system-ui, -apple-system, 'Segoe UI', Roboto, sans-serif; color: var(--ink);
@@ -49,10 +53,30 @@ h2 { font-size: 1.15rem; margin: 2.2rem 0 .4rem; }
 table { border-collapse: collapse; margin: .3rem 0 1rem; font-variant-numeric: tabular-nums; }
 th, td { padding: .28rem .9rem; border-bottom: 1px solid var(--line); text-align: right; }
 th { color: var(--soft); font-weight: 600; }
-th:first-child, td:first-child { text-align: left; }
+th:first-child, td:first-child, .words td { text-align: left; }
+.figures td:not(:last-child) { white-space: nowrap; }
+.words td + td { overflow-wrap: anywhere; }
+@media (max-width: 480px) {
+  body { padding: 1rem .8rem 2rem; }
+  .figures table { font-size: .72rem; }
+  th, td { padding: .25rem .15rem; }
+}
 ul { margin: .3rem 0; padding-left: 1.2rem; }
 img { max-width: 100%; height: auto; display: block; }
 """
+
+_FIT_PAPER = """
+<script>
+for (const [event, print] of [['beforeprint', true], ['afterprint', false]])
+  addEventListener(event, () => document.querySelectorAll('.panels').forEach(panels => {
+    const width = panels.clientWidth, columns = getComputedStyle(panels).gridTemplateColumns;
+    panels.style.width = print ? `${width}px` : '';
+    panels.style.gridTemplateColumns = print ? columns : '';
+    panels.style.zoom = print ? Math.min(1, 680 / width) : '';
+  }));
+</script>
+"""
+"""Shrinks drawn panels as they are to the width of a sheet of A4 or letter paper [CSS px]."""
 
 
 def page(title: str, parts: Iterable[str]) -> str:
@@ -62,7 +86,15 @@ def page(title: str, parts: Iterable[str]) -> str:
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f'<title>{html.escape(title)} — maglev stage</title><style>{_CSS}</style></head><body>'
     )
-    return '\n'.join([head, *(part for part in parts if part), '</body></html>\n'])
+    return '\n'.join([head, *(part for part in parts if part), _FIT_PAPER, '</body></html>\n'])
+
+
+def run_folder(bag: Path) -> Path:
+    """The folder of the run whose folder, bag or bag's file this is: its pages lie there."""
+    bag = bag.resolve()
+    if bag.is_file():
+        bag = bag.parent
+    return bag if (bag / 'bag').is_dir() else bag.parent
 
 
 def write_page(path: Path, text: str) -> None:
@@ -91,13 +123,13 @@ def picture(plot: Plot) -> str:
     )
 
 
-def html_table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table of plain text."""
+def html_table(heads: Sequence[str], rows: Iterable[Sequence[str]], kind: str = 'figures') -> str:
+    """A table of plain text, of ``figures`` or ``words``."""
     head = ''.join(f'<th>{html.escape(name)}</th>' for name in heads)
     body = ''.join(
         '<tr>' + ''.join(f'<td>{html.escape(cell)}</td>' for cell in row) + '</tr>' for row in rows
     )
-    return f'<div class="wide"><table><tr>{head}</tr>{body}</table></div>'
+    return f'<div class="wide {kind}"><table><tr>{head}</tr>{body}</table></div>'
 
 
 def bullets(title: str, lines: Sequence[str]) -> str:

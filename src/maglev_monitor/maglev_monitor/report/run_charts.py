@@ -21,6 +21,7 @@ from maglev_monitor.report.chart import (
     Chart,
     Panels,
     band,
+    bars,
     column,
     envelope,
     legend,
@@ -32,6 +33,7 @@ from maglev_monitor.report.chart import (
     shade,
 )
 from maglev_monitor.report.error_charts import reversals, spectrum
+from maglev_monitor.report.published import first_number, published_step, published_tracking
 from maglev_monitor.report.scales import FLOOR, MOVES, TITLES, units
 
 FloatArray = NDArray[np.float64]
@@ -41,7 +43,7 @@ _SINCE = 'time since lift-off [s]'
 
 def charts(analysis: Analysis) -> Iterator[Chart]:
     """All figures that the run gives something for, in the order of the report."""
-    makers = (_overview, _steps, _tracking, reversals, spectrum, _path, _currents, _timing)
+    makers = (_overview, _steps, _tracking, _beside, reversals, spectrum, _path, _currents, _timing)
     for maker in makers:
         made = maker(analysis)
         if made is not None:
@@ -83,7 +85,7 @@ def _tracking(analysis: Analysis) -> Chart | None:
         milli, micro = units(axis)
         left = panels.panel(TITLES[axis], f'{axis} [{milli}]')
         mean = analysis.result['axes'][axis]['mean_abs_error']
-        note = f', mean |e| over the window {1e6 * mean:.1f} {micro}' if mean is not None else ''
+        note = f', mean |e| {1e6 * mean:.1f} {micro}' if mean is not None else ''
         right = panels.panel(f'error of {axis}{note}', f'e [{micro}]')
         line(left, time, 1e3 * values[:, column(source, index).place], source, POSITION)
         reference = 1e3 * values[:, column('reference', index).place]
@@ -94,8 +96,36 @@ def _tracking(analysis: Analysis) -> Chart | None:
         drawn += [left, right]
     _name_once(drawn)
     span = (int(sequence[-1]) - int(sequence[0]) + 1) * analysis.run.metrics.sample_time
-    caption = f'The last {span:.1f} s of tracking, every sample (as Figs. 7, 8 of the paper).'
+    caption = (
+        f'The last {span:.1f} s of tracking, every sample (as Figs. 7, 8 of the paper). Mean |e| '
+        'is that over the whole window.'
+    )
     return Chart('Tracking in detail', caption, drawn)
+
+
+def _beside(analysis: Analysis) -> Chart | None:
+    """The paper's mean errors beside the run's, where it follows the paper's ellipse."""
+    published = published_tracking(analysis)
+    axes = analysis.result['axes']
+    if published is None or axes['y']['mean_abs_error'] is None:
+        return None
+    panels = []
+    for unit, tilts in (('µm', False), ('µrad', True)):
+        given = {
+            axis: error
+            for axis, error in published.mean_error.items()
+            if (axis in ('phi', 'theta')) == tilts
+        }
+        if given:
+            ours = [1e6 * axes[axis]['mean_abs_error'] for axis in given]
+            paper = [1e6 * error for error in given.values()]
+            groups = {"the paper's machine": paper, 'this run': ours}
+            panels.append(bars(published.title, f'mean |e| [{unit}]', list(given), groups))
+    caption = (
+        'Mean |e| over the tracking window, of the paper over 60 s on its own machine (section '
+        f'IV-B), of this run by its {analysis.result["error_source"]} position.'
+    )
+    return Chart("Beside the paper's machine", caption, panels)
 
 
 def _steps(analysis: Analysis) -> Chart | None:
@@ -115,7 +145,8 @@ def _steps(analysis: Analysis) -> Chart | None:
     caption = (
         'Every step of an axis from its first sample on, and its absolute error on a logarithmic '
         'scale (as Figs. 4 and 5 of the paper). The bands are the bounds of t_s and t_enc, the '
-        'upright lines the instants at which the error has come to stay within them.'
+        'upright lines the instants at which the error has come to stay within them; in grey those '
+        "of the paper's machine, where it made the same step."
     )
     return Chart('Steps', caption, drawn)
 
@@ -139,6 +170,10 @@ def _step_panels(
         for name in ('settling_time', 'encoder_time'):
             if found is not None and found[name] is not None:
                 mark(right, found[name], colour)
+        published = found and published_step(found)
+        if published:
+            for words in (published.settling_time, published.encoder_time):
+                mark(right, first_number(words), REFERENCE)
     for bound in (settings.settling_bound, settings.encoder_bound):
         level(right, 1e6 * bound[index])
         band(right, FLOOR, 1e6 * bound[index])
@@ -196,20 +231,22 @@ def _currents(analysis: Analysis) -> Chart | None:
         envelope(left, time, whole, column('direct_current', motor), 'i_d', POSITION)
         envelope(left, time, whole, column('quadrature_current', motor), 'i_q', SECOND)
         thermal = whole.high[:, column('thermal_load', motor).place]
-        title = f'largest phase current of motor {motor + 1}'
+        title = f'largest phase of motor {motor + 1}'
         if np.nanmax(thermal, initial=0.0) > 0.0:
-            title += f', thermal budget used up to {100.0 * np.nanmax(thermal):.0f} %'
+            title += f', {100.0 * np.nanmax(thermal):.0f} % of its heat'
         right = panels.panel(title, '[A]')
         high = whole.high[:, column('phase_current', motor).place]
         line(right, time, high, 'largest phase current', POSITION)
         level(right, settings.peak_current, ERROR, 'solid')
         level(right, settings.continuous_current, ERROR)
         right.y_range.start = 0.0
+        right.y_range.end = 1.05 * max(settings.peak_current, np.nanmax(high))
         drawn += [left, right]
     _name_once(drawn)
     caption = (
         'Commanded direct and quadrature currents, and the largest of the three phase currents of '
-        "each motor against its amplifier's peak (solid line) and rating (dotted line)."
+        "each motor against its amplifier's peak (solid line) and rating (dotted line); heat is "
+        'the share of its thermal budget that was used at most.'
     )
     return Chart('Currents', caption, drawn)
 

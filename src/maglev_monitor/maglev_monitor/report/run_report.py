@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import datetime
+import html
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from maglev_model.axes import AXES
+from maglev_model.paper import PublishedTracking
+from maglev_model.parameters import specs
 from maglev_monitor.bag.analysis import Analysis
 from maglev_monitor.metrics.readable import (
     angle_or_length,
@@ -14,33 +17,45 @@ from maglev_monitor.metrics.readable import (
     micro,
     number,
     saturation,
-    seconds,
 )
+from maglev_monitor.metrics.run_parameters import RunLimits
+from maglev_monitor.report import tables
 from maglev_monitor.report.chart import render as render_charts
-from maglev_monitor.report.page import bullets, header, html_table, page, write_page
+from maglev_monitor.report.page import REPLAY, bullets, header, html_table, page, write_page
+from maglev_monitor.report.published import published_step, published_tracking
 from maglev_monitor.report.run_charts import charts
+
+_PAPER = "the paper's machine"
+_LIMITS = specs(RunLimits)
 
 
 def write_report(path: Path, analysis: Analysis) -> None:
     """Write ``report.html`` in one go. Raises OSError when the folder cannot be written."""
-    write_page(path, render(analysis))
+    replay = REPLAY if (path.parent / REPLAY).is_file() else ''
+    write_page(path, render(analysis, replay))
 
 
-def render(analysis: Analysis) -> str:
-    """The whole report as HTML; nothing is fetched."""
+def render(analysis: Analysis, replay: str = '') -> str:
+    """The whole report as HTML; nothing is fetched. ``replay`` is a page beside it to lead to."""
     result = analysis.result
     name = result['scenario'] or 'run'
     parts = [
         _header(result, name),
+        _origin(analysis, replay),
         bullets('Why', result['reasons']),
         bullets('The bag', analysis.notes),
         bullets('Missing samples', [holes({key: hole}) for key, hole in result['holes'].items()]),
         _cards(result),
-        _tracking_table(result),
-        _step_table(result),
+        _errors_tables(result, published_tracking(analysis)),
+        _tables(
+            'Repeatability, ISO 230-2',
+            tables.REPEATABILITY.values(),
+            tables.repeatability(result),
+        ),
+        _steps_tables(result),
         _limits_table(result['limits']),
-        _changes_table(analysis.changes),
         *render_charts(list(charts(analysis))),
+        _changes_table(analysis.changes),
     ]
     return page(name, parts)
 
@@ -52,6 +67,19 @@ def _header(result: Mapping[str, Any], name: str) -> str:
         f'errors of the {result["error_source"]} position',
     ]
     return header(name, result['verdict'], words)
+
+
+def _origin(analysis: Analysis, replay: str) -> str:
+    """When and by what it was flown, as far as the bag says, and the way to the replay."""
+    custom, begun = analysis.custom, analysis.curves.begun
+    words = [f'Flown by {custom["command"]}' if 'command' in custom else 'Flown']
+    if begun is not None:
+        when = datetime.datetime.fromtimestamp(1e-9 * begun, datetime.timezone.utc)
+        words.append(f'on {when:%Y-%m-%d at %H:%M} UTC')
+    if 'software' in custom:
+        words.append(f'with {custom["software"]}')
+    link = f' <a href="{replay}">See it fly again in 3D.</a>' if replay else ''
+    return f'<p class="note">{html.escape(" ".join(words))}.{link}</p>'
 
 
 def _cards(result: Mapping[str, Any]) -> str:
@@ -76,30 +104,39 @@ def _microseconds(value: float | None) -> str:
     return '–' if value is None else f'{value * 1e6:.0f} µs'
 
 
-def _tracking_table(result: Mapping[str, Any]) -> str:
-    axes = result['axes']
-    if axes['y']['mean_abs_error'] is None:
-        return ''
-    names = ('mean_abs_error', 'rms_error', 'max_abs_error')
-    rows = [[axis, *(micro(axis, axes[axis][name]) for name in names)] for axis in AXES]
-    return '<h2>Tracking errors</h2>' + html_table(['axis', 'mean |e|', 'rms e', 'max |e|'], rows)
+def _errors_tables(result: Mapping[str, Any], published: PublishedTracking | None) -> str:
+    heads, found = tuple(tables.ERRORS.values()), tables.errors(result)
+    if published is None:
+        return _tables('Tracking errors', heads, found)
+    paper = published.mean_error
+    return _tables(
+        'Tracking errors',
+        (*heads, f'{_PAPER}: mean |e|'),
+        (
+            (whose, [[*row, micro(row[0], paper.get(row[0]))] for row in rows])
+            for whose, rows in found
+        ),
+    )
 
 
-def _step_table(result: Mapping[str, Any]) -> str:
-    rows = [
-        [
-            step['axis'],
-            angle_or_length(step['axis'], step['from']),
-            angle_or_length(step['axis'], step['to']),
-            f'{step["overshoot_percent"]:.1f} %',
-            seconds(step['settling_time']),
-            seconds(step['encoder_time']),
-        ]
-        for step in result['steps']
-    ]
-    if not rows:
-        return ''
-    return '<h2>Steps</h2>' + html_table(['axis', 'from', 'to', 'overshoot', 't_s', 't_enc'], rows)
+def _steps_tables(result: Mapping[str, Any]) -> str:
+    published = [published_step(step) for step in result['steps']]
+    if not any(published):
+        return _tables('Steps', tables.STEPS, tables.steps(result))
+    told = [', '.join(known[3:]) if known else '' for known in published]
+    return _tables(
+        'Steps',
+        (*tables.STEPS, _PAPER),
+        (
+            (whose, [[*row, words] for row, words in zip(rows, told, strict=True)])
+            for whose, rows in tables.steps(result)
+        ),
+    )
+
+
+def _tables(title: str, heads: Iterable[str], found: Iterable[tuple[str, list[list[str]]]]) -> str:
+    parts = [html_table([whose, *heads], rows) for whose, rows in found]
+    return f'<h2>{title}</h2>' + ''.join(parts) if parts else ''
 
 
 def _limits_table(limits: Mapping[str, Any]) -> str:
@@ -110,7 +147,7 @@ def _limits_table(limits: Mapping[str, Any]) -> str:
                 f'{axis} {angle_or_length(axis, bound)}' for axis, bound in value.items()
             )
         else:
-            shown = number(value)
+            shown = f'{number(value)} {_LIMITS[name].unit}'.rstrip()
         rows.append([name.replace('_', ' '), shown])
     return '<h2>Limits</h2>' + html_table(['limit', 'value'], rows) if rows else ''
 
@@ -118,4 +155,5 @@ def _limits_table(limits: Mapping[str, Any]) -> str:
 def _changes_table(changes: Sequence[tuple[str, str]]) -> str:
     if not changes:
         return ''
-    return '<h2>Parameters that are not as by default</h2>' + html_table(['node', ''], changes)
+    table = html_table(['node', ''], changes, 'words')
+    return f'<h2>Parameters that are not as by default</h2>{table}'

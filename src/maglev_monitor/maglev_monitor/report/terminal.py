@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from maglev_model.axes import AXES
 from maglev_monitor.metrics.readable import (
-    angle_or_length,
     holes,
-    micro,
     number,
     saturation,
-    seconds,
 )
+from maglev_monitor.report import tables
 
 
 def as_text(figures: Mapping[str, Any]) -> str:
     """The content of ``metrics.json`` as lines of text."""
     lines = [
         _title(figures),
-        *_tracking_lines(figures),
-        *_step_lines(figures),
+        *_lines('tracking', tables.ERRORS.values(), tables.errors(figures)),
+        *_lines('ISO 230-2', tables.REPEATABILITY.values(), tables.repeatability(figures)),
+        *_lines('steps', tables.STEPS, tables.steps(figures)),
         *_other_lines(figures),
     ]
     word = f'verdict: {figures["verdict"]}'
@@ -41,28 +39,13 @@ def _title(figures: Mapping[str, Any]) -> str:
     )
 
 
-def _tracking_lines(figures: Mapping[str, Any]) -> Iterator[str]:
-    axes = figures['axes']
-    if axes['y']['mean_abs_error'] is None:
-        return
-    yield f'  {"tracking":<8}{"mean |e|":>16}{"rms e":>16}{"max |e|":>16}'
-    for axis in AXES:
-        row = axes[axis]
-        names = ('mean_abs_error', 'rms_error', 'max_abs_error')
-        yield f'  {axis:<8}' + ''.join(f'{micro(axis, row[name]):>16}' for name in names)
-
-
-def _step_lines(figures: Mapping[str, Any]) -> Iterator[str]:
-    if not figures['steps']:
-        return
-    yield f'  {"step":<8}{"from":>14}{"to":>14}{"overshoot":>12}{"t_s":>12}{"t_enc":>12}'
-    for step in figures['steps']:
-        axis = step['axis']
-        yield (
-            f'  {axis:<8}{angle_or_length(axis, step["from"]):>14}'
-            f'{angle_or_length(axis, step["to"]):>14}{step["overshoot_percent"]:>10.1f} %'
-            f'{seconds(step["settling_time"]):>12}{seconds(step["encoder_time"]):>12}'
-        )
+def _lines(
+    what: str, heads: Iterable[str], found: Iterable[tuple[str, list[list[str]]]]
+) -> Iterator[str]:
+    for whose, rows in found:
+        yield f'  {f"{what}, {whose}":<32}' + ''.join(f'{head:>16}' for head in heads)
+        for axis, *cells in rows:
+            yield f'  {axis:<32}' + ''.join(f'{cell:>16}' for cell in cells)
 
 
 def _other_lines(figures: Mapping[str, Any]) -> Iterator[str]:

@@ -40,7 +40,7 @@ class SensorArrays(Record):
     jitter: float  # [s]
     address: int  # of the foreign model, 0 for none
     memory: Annotated[FloatArray, 6, 4]
-    own: Annotated[FloatArray, 6]  # lengths now on the encoders' own scales [m]
+    own: Annotated[FloatArray, 6]  # lengths now on the encoders' own scales, effects or not [m]
 
 
 def sensor_arrays(parameters: PlantParameters) -> SensorArrays:

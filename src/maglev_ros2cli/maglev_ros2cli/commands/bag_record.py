@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import signal
+import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -10,6 +12,7 @@ from typing import Any
 from rclpy.qos import HistoryPolicy, QoSProfile
 from rclpy.topic_or_service_is_hidden import topic_or_service_is_hidden
 
+from maglev_model.command import noted
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.recorder import bag_qos, message_folder
 from maglev_monitor.bag.writer import BagWriter
@@ -62,50 +65,49 @@ def record(arguments: Any) -> None:
     if output.exists():
         raise CommandError(f"[ERROR] [ros2bag]: Output folder '{output}' already exists.")
     writer = BagWriter(output, message_folder)
-    with node(arguments.node_name) as own:
-        recorder = _Recorder(own, writer, arguments)
+    with node(arguments.node_name) as own, noted(signal.SIGINT, signal.SIGTERM) as caught:
+        recorder = _Recorder(own, writer, arguments, caught)
         try:
             writer.open()
             own.get_logger().info('Listening for topics...')
             discover(own, arguments.spin_time)
             recorder.run()
-        except KeyboardInterrupt:
-            pass
         except BagError as error:
             raise CommandError(f'[ERROR] [ros2bag]: {error}') from error
         finally:
             writer.close()
         own.get_logger().info('Recording stopped')
+    if signal.SIGTERM in caught:
+        sys.exit(128 + signal.SIGTERM)
 
 
 class _Recorder:
     """The subscriptions of a recording, and what they bring."""
 
-    def __init__(self, own: PollingNode, writer: BagWriter, arguments: Any) -> None:
+    def __init__(
+        self, own: PollingNode, writer: BagWriter, arguments: Any, caught: list[int]
+    ) -> None:
         self._own = own
         self._writer = writer
         self._arguments = arguments
+        self._caught = caught
         self._overrides = overrides(arguments.qos_profile_overrides_path)
         self._taps: dict[str, PolledSubscription] = {}
         self._ignored: set[str] = set()
 
     def run(self) -> None:
-        """Write what comes, until an exception; what is there then is written still."""
+        """Write what comes, until a signal; what is there then is written still."""
         self._subscribe()
         self._own.get_logger().info('Recording...')
         flushed = time.monotonic()
-        try:
-            while True:
-                time.sleep(_POLL)
-                self._take()
-                if not self._arguments.no_discovery:
-                    self._subscribe()
-                if time.monotonic() - flushed >= _FLUSH:
-                    flushed = time.monotonic()
-                    self._writer.flush()
-        except (KeyboardInterrupt, SystemExit):
+        while not self._caught:
+            time.sleep(_POLL)
+            if not self._arguments.no_discovery:
+                self._subscribe()
+            if time.monotonic() - flushed >= _FLUSH:
+                flushed = time.monotonic()
+                self._writer.flush()
             self._take()
-            raise
 
     def _take(self) -> None:
         for topic, tap in self._taps.items():

@@ -14,7 +14,6 @@ from rclpy.topic_or_service_is_hidden import topic_or_service_is_hidden
 from maglev_node.polling import PollingNode
 from maglev_ros2cli.errors import CommandError
 from maglev_ros2cli.graph import (
-    NodeName,
     absolute,
     add_arguments,
     add_node_name,
@@ -61,12 +60,8 @@ def list_(arguments: Any) -> None:
 def info(arguments: Any) -> None:
     """A node's topics, services and actions."""
     full = absolute(arguments.node_name)
-
-    def same_name(own: PollingNode) -> list[NodeName]:
-        return [each for each in nodes(own, hidden=True) if each.full == full]
-
-    with graph(arguments, same_name) as own:
-        same = same_name(own)
+    with graph(arguments) as own:
+        same = [each for each in nodes(own, hidden=True) if each.full == full]
         if not same:
             raise CommandError(f"Unable to find node '{arguments.node_name}'")
         if len(same) > 1:

@@ -67,7 +67,7 @@ def _print_counts(
 def info(arguments: Any) -> None:
     """Type and endpoints of a topic."""
     name = absolute(arguments.topic_name)
-    with graph(arguments, lambda own: name in topics(own)) as own:
+    with graph(arguments) as own:
         types = topics(own).get(name)
         if types is None:
             raise CommandError(f"Unknown topic '{arguments.topic_name}'")

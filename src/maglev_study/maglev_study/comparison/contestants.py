@@ -38,13 +38,16 @@ def find_contestants(
 
     They come in the order of the paper's references, then others, the paper's own and the default.
 
-    Each file of ``params/laws`` is one; ``paper`` is ``params/paper.yaml``, ``default`` has no file
-    but ``params/controller.yaml``. ``overlays`` are parameter files over those of every law, the
-    last one wins. Raises :class:`ParameterError` for a name that is none of them, and for a file
-    that cannot be used.
+    Each file of ``params/laws`` is one, and each that is named by its path, ``my_law.yaml``;
+    ``paper`` is ``params/paper.yaml``, ``default`` has no file but ``params/controller.yaml``.
+    ``overlays`` are parameter files over those of every law, the last one wins. Raises
+    :class:`ParameterError` for a name that is none of them, and for a file that cannot be used.
     """
     files = {path.stem: path for path in sorted((params / 'laws').glob('*.yaml'))}
     files |= {'paper': params / 'paper.yaml', 'default': params / 'controller.yaml'}
+    own = {name: Path(name) for name in names if name.endswith('.yaml')}
+    files |= {path.stem: path for path in own.values()}
+    names = [own[name].stem if name in own else name for name in names]
     found = (_contestant(params, name, path, overlays) for name, path in files.items())
     everyone = sorted(found, key=_place)
     for name in names:

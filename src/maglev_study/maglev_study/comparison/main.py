@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import json
 import os
 import sys
 import time
@@ -16,6 +17,7 @@ from maglev_controller.laws import control_law, find_law
 from maglev_model.axes import THETA, X, Y
 from maglev_model.command import leave_with
 from maglev_model.parameters import ParameterError, replace
+from maglev_model.progress import Progress, add_output_options, talking
 from maglev_study.closed_loop import warm_up
 from maglev_study.comparison.contestants import Contestant, find_contestants
 from maglev_study.comparison.experiments import Row, loops, steps, tracking
@@ -40,12 +42,21 @@ def main() -> NoReturn:
 def compare(arguments: Sequence[str] | None = None) -> int:
     """Run the command and return its exit code."""
     options = _parser().parse_args(arguments)
+    with talking(options):
+        code, outcome = _compared(options)
+    if options.json:
+        print(json.dumps({'passed': code == 0, **outcome}))
+    return code
+
+
+def _compared(options: argparse.Namespace) -> tuple[int, dict[str, Any]]:
+    """Exit code, and the outcome for who wants it as JSON."""
     try:
         contestants = _contestants(options)
         out = _folder(options.out)
     except ParameterError as error:
         print(f'compare: error: {error}', file=sys.stderr)
-        return 2
+        return 2, {}
     print('the closed loop as a library, without ROS: the graph would take hours', flush=True)
     started = time.monotonic()
     warm_up()
@@ -53,7 +64,7 @@ def compare(arguments: Sequence[str] | None = None) -> int:
         rows, regions = _compare(contestants, options.quick)
     except KeyboardInterrupt:
         print('compare: interrupted', file=sys.stderr)
-        return 130
+        return 130, {'out': str(out)}
     text = table(rows, regions)
     print('\n' + text + '\n', flush=True)
     from maglev_study.comparison.plot import draw_regions
@@ -64,12 +75,13 @@ def compare(arguments: Sequence[str] | None = None) -> int:
         'overlays': [str(path) for path in options.overlay],
     }
     (out / 'comparison.txt').write_text(text + '\n', encoding='utf-8')
-    (out / 'comparison.json').write_text(to_json(rows, regions, facts), encoding='utf-8')
+    found = to_json(rows, regions, facts)
+    (out / 'comparison.json').write_text(found, encoding='utf-8')
     draw_regions(regions, out / 'regions.png')
     print(f'compare: done in {time.monotonic() - started:.0f} s')
     for name in ('comparison.txt', 'comparison.json', 'regions.png'):
         print(f'  {out / name}')
-    return 0
+    return 0, {'out': str(out), 'comparison': json.loads(found)}
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -94,6 +106,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar='RAD_S',
         help='crossover of the laws with compensators on all axes (default: as in their files)',
     )
+    add_output_options(parser)
     return parser
 
 
@@ -150,14 +163,16 @@ def _compare(
 
 def _run(pool: Executor, parts: Sequence[Part]) -> dict[tuple[str, str], Any]:
     """The results by law and part; the work that is left is dropped when one fails."""
+    progress = Progress('compare', 'parts')
     futures = {pool.submit(part.work, *part.arguments): part for part in parts}
     found: dict[tuple[str, str], Any] = {}
     try:
         for future in as_completed(futures):
             part = futures[future]
             found[part.law, part.name] = future.result()
-            print(f'  {len(found)}/{len(parts)} {part.law}: {part.name}', flush=True)
+            progress.tell(len(found), len(parts), f', {part.law}: {part.name}')
     except BaseException:
+        progress.end()
         pool.shutdown(wait=False, cancel_futures=True)
         raise
     return found

@@ -5,15 +5,18 @@ from __future__ import annotations
 import multiprocessing
 import signal
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from itertools import groupby
 from multiprocessing.synchronize import Event
 from typing import NamedTuple, TypeVar
 
+from maglev_model.command import noted
 from maglev_study.faults.fly import Scenario
 from maglev_study.faults.judge import Verdict
 from maglev_study.faults.shrink import shrink
 from maglev_study.faults.train import fly_all, warm_up
+
+_LOOK = 0.2  # from a look at the signals to the next [s]
 
 _stop: Event | None = None
 
@@ -65,17 +68,18 @@ class Campaign:
     def _do(self, futures: list[Future[T]], heard: Callable[[T], None]) -> None:
         if self.interrupted:
             return
-        told: set[Future[T]] = set()
-        try:
-            for future in as_completed(futures):
-                heard(future.result())
-                told.add(future)
-        except KeyboardInterrupt:
-            self.interrupted = True
-            self._stop.set()
-            self._pool.shutdown(cancel_futures=True)
-            for future in futures:
-                if future not in told and not future.cancelled():
+        waiting = set(futures)
+        with noted(signal.SIGINT) as caught:
+            while waiting and not caught:
+                done, waiting = wait(waiting, _LOOK, FIRST_COMPLETED)
+                for future in done:
+                    heard(future.result())
+            self.interrupted = bool(caught)
+            if self.interrupted:
+                self._stop.set()
+                self._pool.shutdown(cancel_futures=True)
+            for future in waiting:
+                if not future.cancelled():
                     heard(future.result())
 
 

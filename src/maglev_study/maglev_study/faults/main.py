@@ -13,7 +13,9 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
+from maglev_model.progress import Progress, add_output_options, talking
 from maglev_study.faults.campaign import Campaign, Outcome
 from maglev_study.faults.draw import cells, from_json, scenario
 from maglev_study.faults.fly import Scenario
@@ -34,13 +36,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     0: all rules hold; 1: some do not; 2: wrong use; 130: interrupted, the page tells what was done.
     """
     options = _parser().parse_args(arguments)
+    with talking(options):
+        code, outcome = _flown(options)
+    if options.json:
+        print(json.dumps({'passed': code == PASS, 'out': str(options.out), **outcome}))
+    return code
+
+
+def _flown(options: argparse.Namespace) -> tuple[int, dict[str, Any]]:
+    """Exit code, and the outcome for who wants it as JSON."""
     try:
         out = _folder(options.out)
         if options.replay is not None:
             return _replay(_run_of(options.replay, options.double), out)
     except ValueError as error:
         print(f'faults: error: {error}', file=sys.stderr)
-        return WRONG_USE
+        return WRONG_USE, {}
     number = len(cells()) if options.short else options.runs
     runs = [
         scenario(seed, double=options.double) for seed in range(options.seed, options.seed + number)
@@ -48,21 +59,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return _fly(runs, options.jobs, out)
 
 
-def _fly(runs: Sequence[Scenario], jobs: int, out: Path) -> int:
+def _fly(runs: Sequence[Scenario], jobs: int, out: Path) -> tuple[int, dict[str, Any]]:
     started = time.monotonic()
     outcomes: list[Outcome] = []
     shrunk: list[tuple[Outcome, Outcome]] = []
 
+    progress = Progress('faults', 'runs')
+    progress.tell(0, len(runs))
+
     def heard(new: list[Outcome]) -> None:
         outcomes.extend(new)
-        spent = time.monotonic() - started
         broken = sum(bool(one.verdict.violations) for one in outcomes)
-        left = spent / max(len(outcomes), 1) * (len(runs) - len(outcomes))
-        print(
-            f'faults: {len(outcomes)} of {len(runs)} runs, {broken} with a rule broken,'
-            f' {spent:.0f} s, about {left:.0f} s left',
-            flush=True,
-        )
+        progress.tell(len(outcomes), len(runs), f', {broken} with a rule broken')
 
     def report() -> Path:
         spent = time.monotonic() - started
@@ -72,6 +80,7 @@ def _fly(runs: Sequence[Scenario], jobs: int, out: Path) -> int:
 
     with Campaign(jobs) as campaign:
         campaign.fly(runs, heard)
+        progress.end()
         tally = Tally(sorted(outcomes, key=lambda one: one.run.seed))
         path = report()
         examples = tally.examples()[:_SHRUNK]
@@ -80,10 +89,17 @@ def _fly(runs: Sequence[Scenario], jobs: int, out: Path) -> int:
             campaign.shrink(examples, shrunk.append)
             path = report()
     _tell(tally, shrunk, path)
+    outcome = {
+        'runs': len(tally.outcomes),
+        'wanted': len(runs),
+        'broken': {str(rule): number for rule, number in tally.by_rule().items()},
+        'seeds': [one.run.seed for one in tally.failures],
+        'page': str(path),
+    }
     if campaign.interrupted:
         print('faults: interrupted', file=sys.stderr)
-        return INTERRUPTED
-    return BROKEN if tally.failures else PASS
+        return INTERRUPTED, outcome
+    return BROKEN if tally.failures else PASS, outcome
 
 
 def _tell(tally: Tally, shrunk: Sequence[tuple[Outcome, Outcome]], path: Path) -> None:
@@ -101,7 +117,7 @@ def _tell(tally: Tally, shrunk: Sequence[tuple[Outcome, Outcome]], path: Path) -
     print(f'page: {path}')
 
 
-def _replay(run: Scenario, out: Path) -> int:
+def _replay(run: Scenario, out: Path) -> tuple[int, dict[str, Any]]:
     from maglev_study.faults.replay import replay
     from maglev_study.faults.replay import write as write_replay
 
@@ -117,7 +133,9 @@ def _replay(run: Scenario, out: Path) -> int:
     for rule, text in verdict.violations:
         print(f'  broken: rule {rule}: {text}')
     print(f'page: {path}')
-    return BROKEN if verdict.violations else PASS
+    broken = [f'rule {rule}: {text}' for rule, text in verdict.violations]
+    outcome = {'seed': run.seed, 'broken': broken, 'impact': verdict.impact, 'page': str(path)}
+    return BROKEN if broken else PASS, outcome
 
 
 def _run_of(text: str, double: bool) -> Scenario:
@@ -165,6 +183,7 @@ def _parser() -> argparse.ArgumentParser:
     add('--short', action='store_true', help='one run of each cell of fault and phase')
     add('--replay', metavar='SEED|FILE', help='fly one run alone, and draw it')
     add('--out', type=Path, default=Path('faults'), metavar='DIR', help='where the page is left')
+    add_output_options(parser)
     return parser
 
 

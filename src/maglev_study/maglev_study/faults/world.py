@@ -71,7 +71,6 @@ class World(EmulatedBoards):
         self.rng = np.random.default_rng(0)
         self._behaviour: dict[tuple[str, int], Behaviour] = {}
         self._proxies: list[FaultyCard] = []
-        self._rest = np.array(parameters.emulation.wiring.offset)
         self._gains = np.zeros(12)
         super().__init__(parameters)
         self._gains[:] = self.rig.arrays.gain
@@ -126,19 +125,15 @@ class World(EmulatedBoards):
 
     def tick(self) -> None:
         """One sample passes."""
-        volts = self.volts[self._outputs]
+        super().tick()
+        self.observe()
+
+    def outputs(self) -> NDArray[np.float64]:
+        """What the amplifiers take for what they are asked for, shape (12,) [V]."""
+        volts = super().outputs()
         if self._faulty_amplifiers:
             volts = np.where(np.isnan(self.stuck_on), volts, self.stuck_on)
-        if not self.enabled:
-            volts = self._rest
-        self.rig.advance(volts)
-        self.ticks += 1
-        row = self.past[self.ticks % len(self.past)]
-        row[:10], row[10:] = self.rig.stage.state, self.rig.stage.command
-        self._count()
-        for card in list(self.cards.values()):
-            card.on_tick()
-        self.observe()
+        return volts
 
     _faulty_amplifiers = False
 
@@ -163,8 +158,8 @@ class World(EmulatedBoards):
 
     def output_error(self) -> NDArray[np.float64]:
         """What the phases' outputs (12,) are off the voltage that makes no current [V]."""
-        volts: NDArray[np.float64] = self.volts[self._outputs]
-        return volts - np.where(volts == 0.0, 0.0, self._rest)
+        volts = super().outputs()
+        return volts - np.where(volts == 0.0, 0.0, self._no_current)
 
     def cure(self) -> None:
         """Everything is sound from now on; what counters have lost stays lost."""

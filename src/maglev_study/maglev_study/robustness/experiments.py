@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
 from maglev_model.axes import AXES, PHI, THETA, FloatArray
+from maglev_model.paper import TRACKING
 from maglev_study.comparison.experiments import DISTURBANCE, GROW, SHAPED_STEPS, StepExperiment
-from maglev_study.paper import TRACKING
 from maglev_study.references import HOVER, References, ellipse, shaped
 from maglev_study.rough_flights import THETA as ELLIPSE_THETA
 from maglev_study.rough_flights import experiments as rough_experiments
@@ -38,7 +38,7 @@ class Experiment:
 
 @functools.lru_cache(maxsize=4)
 def experiments(period: float, tilts: bool = True) -> tuple[Experiment, ...]:
-    """All of them, a sample every ``period`` [s]; without ``tilts`` none is asked for."""
+    """All of them, a sample every ``period`` [s]; without ``tilts`` none of these is asked for."""
     course = ellipse(_RUN_IN + _MEASURED, ELLIPSE_THETA, period, grow=GROW)
     rough = {one.name: one for one in rough_experiments(period, hold=_MEASURED, places=1)}
     scan, hold = rough['scan 2 mm/s'], rough['hold 1']
@@ -59,10 +59,18 @@ def experiments(period: float, tilts: bool = True) -> tuple[Experiment, ...]:
     )
 
 
+def chosen(
+    period: float, tilts: bool = True, names: Collection[str] = ()
+) -> tuple[Experiment, ...]:
+    """Those of some ``names`` that there are, all for none; arguments as of :func:`experiments`."""
+    found = experiments(period, tilts)
+    return tuple(one for one in found if one.name in names) if names else found
+
+
 def _step(step: StepExperiment, period: float) -> Experiment:
     start, target = (_beside(step.axis, value) for value in (step.start, step.end))
     return Experiment(
-        f'step {AXES[step.axis]}',
+        f'step_{AXES[step.axis]}',
         shaped(start, target, step.time, _STEP - step.time, period),
         _STEP,
         approach=shaped(HOVER, start, _APPROACH, _REST, period),

@@ -2,29 +2,28 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import hashlib
 import json
-import signal
-import threading
-from collections.abc import Callable, Iterator, Sequence
+import platform
+from collections.abc import Callable, Sequence
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import joblib
-
-from maglev_model.optional import needed
-from maglev_model.parameters import values
-from maglev_study.closed_loop import warm_up
+from maglev_model.parameters import ParameterError, values
+from maglev_model.sources import sources_digest
 from maglev_study.comparison.contestants import Contestant, find_contestants
 from maglev_study.robustness.draw import NOMINAL, Draw, Machine, check_draws, machine, read_draws
-from maglev_study.robustness.experiments import experiments
+from maglev_study.robustness.experiments import Experiment, chosen, experiments
 from maglev_study.robustness.fly import Flown, fly
 from maglev_study.robustness.journal import Journal
+from maglev_study.robustness.workers import results
 
 JOURNAL = 'flown.jsonl'
 """The file in a campaign's folder that its results are appended to."""
+
+_LIBRARIES = ('numba', 'numpy', 'scipy')  # on which the last bits depend
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,10 +34,19 @@ class Plan:
     seed: int
     draws: tuple[Draw, ...]
     contestants: tuple[Contestant, ...]
+    names: tuple[str, ...] = ()  # of the experiments, none: all
+
+    def experiments(self, contestant: Contestant) -> tuple[Experiment, ...]:
+        """What a law is flown through."""
+        return chosen(contestant.plant.sample_time, contestant.tilts, self.names)
 
     def draw(self, contestant: Contestant, number: int) -> Machine:
         """A machine by its number, about the stage that a law flies on."""
         return machine(self.draws, contestant.plant, self.seed, number)
+
+    def part(self, contestant: Contestant) -> Plan:
+        """The same of one law."""
+        return dataclasses.replace(self, contestants=(contestant,))
 
     def head(self) -> dict[str, Any]:
         """What two campaigns must have in common for one to go on with the other."""
@@ -49,8 +57,11 @@ class Plan:
             for what, table in (('plant', one.plant), ('controller', one.controller))
         }
         return {
+            'code': sources_digest(),
+            'libraries': ' '.join(f'{name} {version(name)}' for name in _LIBRARIES),
             'seed': self.seed,
             'laws': [one.name for one in self.contestants],
+            'experiments': list(self.names) or 'all',
             'distributions': _digest(drawn),
             **tables,
         }
@@ -70,6 +81,7 @@ def make_plan(
     machines: int,
     *,
     laws: Sequence[str] = ('default',),
+    names: Sequence[str] = (),
     overlays: Sequence[Path] = (),
     seed: int = 0,
 ) -> Plan:
@@ -78,7 +90,11 @@ def make_plan(
     draws = read_draws(params / 'robustness.yaml', *overlays)
     for one in contestants:
         check_draws(draws, one.plant)
-    return Plan(machines, seed, draws, contestants)
+    known = [one.name for one in experiments(contestants[0].plant.sample_time)]
+    for name in names:
+        if name not in known:
+            raise ParameterError(f"there is no experiment '{name}', there are: {', '.join(known)}")
+    return Plan(machines, seed, draws, contestants, tuple(names))
 
 
 def campaign(
@@ -87,6 +103,7 @@ def campaign(
     out: Path,
     *,
     laws: Sequence[str] = ('default',),
+    names: Sequence[str] = (),
     overlays: Sequence[Path] = (),
     seed: int = 0,
     jobs: int = 1,
@@ -95,16 +112,17 @@ def campaign(
     """Draw machines, fly each under each law, and return what came of them.
 
     ``params`` is the folder of parameter files, in it ``robustness.yaml`` with the distributions;
-    ``overlays`` are files over those of every law. With more than one of ``jobs`` in processes of
-    their own; with a ``scheduler``, ``tcp://…``, on that Dask cluster. Equal arguments give equal
-    results, bit for bit, however many processes. They are appended to a file in ``out`` as they
-    come; a campaign that is begun there goes on.
+    ``overlays`` are files over those of every law; ``names`` the experiments, by default all. With
+    more than one of ``jobs`` in processes of their own; with a ``scheduler``, ``tcp://…``, on that
+    Dask cluster. Equal arguments give equal results, bit for bit, however many processes. They are
+    appended to a file in ``out`` as they come; a campaign that is begun there goes on.
 
-    Raises ParameterError for what is wrong in the files or was flown otherwise in ``out``,
-    OSError where that cannot be written or the scheduler not be reached, and
-    :class:`~maglev_model.optional.MissingLibraryError` for a scheduler without Dask.
+    Raises ParameterError for what is wrong in the files, was flown otherwise in ``out``, or is of
+    other code on a worker of the cluster; OSError where ``out`` cannot be written or the scheduler
+    not be reached, and :class:`~maglev_model.optional.MissingLibraryError` for a scheduler without
+    Dask.
     """
-    plan = make_plan(params, machines, laws=laws, overlays=overlays, seed=seed)
+    plan = make_plan(params, machines, laws=laws, names=names, overlays=overlays, seed=seed)
     return fly_plan(plan, out, jobs=jobs, scheduler=scheduler)
 
 
@@ -122,51 +140,34 @@ def fly_plan(
     Ctrl-C ends it with what was done.
     """
     out.mkdir(parents=True, exist_ok=True)
-    wanted = [(n, one) for n in range(NOMINAL, plan.machines + 1) for one in plan.contestants]
-    interrupted = False
-    with Journal(out / JOURNAL, plan.head()) as journal:
+    head, interrupted = plan.head(), False
+    flying = [one for one in plan.contestants if plan.experiments(one)]
+    wanted = [(n, one) for n in range(NOMINAL, plan.machines + 1) for one in flying]
+    with Journal(out / JOURNAL, head) as journal:
         done = journal.done
         missing = [(n, one) for n, one in wanted if (n, one.name) not in done]
         count = len(wanted) - len(missing)
         try:
             heard(count, len(wanted), journal.flown)
-            if missing:
-                warm_up()  # compiled once, before there are processes
-            with _processes(jobs, scheduler) as parallel:
-                work = (joblib.delayed(_work)(plan.draws, one, plan.seed, n) for n, one in missing)
-                for new in parallel(work):
-                    journal.add(new)
-                    count += 1
-                    heard(count, len(wanted), new)
+            tasks = [(plan.part(one), head['code'], n) for n, one in missing]
+            for new in results(fly_machine, tasks, jobs=jobs, scheduler=scheduler):
+                journal.add(new)
+                count += 1
+                heard(count, len(wanted), new)
         except KeyboardInterrupt:
             interrupted = True
     return Campaign(plan, _in_order(plan, journal.flown), interrupted)
 
 
-def _work(draws: Sequence[Draw], contestant: Contestant, seed: int, number: int) -> list[Flown]:
-    if threading.current_thread() is threading.main_thread() and _is_worker():
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for whoever started it
-    return fly(machine(draws, contestant.plant, seed, number), contestant)
-
-
-def _is_worker() -> bool:
-    import multiprocessing
-
-    return multiprocessing.parent_process() is not None
-
-
-@contextlib.contextmanager
-def _processes(jobs: int, scheduler: str) -> Iterator[joblib.Parallel]:
-    """What work is given to, a generator of results as they come; one thread a process."""
-    options = {'return_as': 'generator_unordered', 'batch_size': 1}
-    if scheduler:
-        with needed('distributed', '--scheduler'):
-            from distributed import Client
-        with Client(scheduler, timeout=10.0), joblib.parallel_config('dask'):
-            yield joblib.Parallel(**options)
-    else:
-        with joblib.parallel_config('loky', n_jobs=jobs, inner_max_num_threads=1):
-            yield joblib.Parallel(**options)
+def fly_machine(plan: Plan, code: str, number: int) -> list[Flown]:
+    """A machine through a plan of one law, on a worker that must have the same code."""
+    if code != sources_digest():
+        raise ParameterError(
+            f"the code of the worker on {platform.node()} is '{sources_digest()}', that of the"
+            f" campaign '{code}': install the same on both"
+        )
+    (contestant,) = plan.contestants
+    return fly(plan.draw(contestant, number), contestant, plan.names)
 
 
 def _in_order(plan: Plan, flown: Sequence[Flown]) -> tuple[Flown, ...]:

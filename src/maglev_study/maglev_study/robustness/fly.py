@@ -6,6 +6,7 @@ import base64
 import dataclasses
 import math
 import threading
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from maglev_study.closed_loop import Run
 from maglev_study.comparison.contestants import Contestant
 from maglev_study.comparison.flight import SETTLED, Flight, Step, judge
 from maglev_study.robustness.draw import Machine
-from maglev_study.robustness.experiments import Experiment, experiments
+from maglev_study.robustness.experiments import Experiment, chosen
 
 BINS = 50
 """Parts of the measured time for each of which the largest errors are kept."""
@@ -66,10 +67,10 @@ class Flown:
         return cls(**{**plain, **arrays, 'envelope': envelope.astype(np.float64)})
 
 
-def fly(machine: Machine, contestant: Contestant) -> list[Flown]:
-    """A drawn machine under a law, through every experiment, one after another."""
+def fly(machine: Machine, contestant: Contestant, names: Collection[str] = ()) -> list[Flown]:
+    """A drawn machine under a law, through the experiments of some ``names``, or through all."""
     flown = dataclasses.replace(contestant, plant=machine.plant)
-    found = experiments(machine.plant.sample_time, contestant.tilts)
+    found = chosen(machine.plant.sample_time, contestant.tilts, names)
     with _one_at_a_time:
         return [_fly(machine.number, flown, experiment) for experiment in found]
 

@@ -7,15 +7,16 @@ machine, with which the whole graph flies it.
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import sys
-import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from maglev_model.optional import MissingLibraryError
 from maglev_model.parameters import ParameterError
+from maglev_model.progress import Progress, add_output_options, talking
 
 if TYPE_CHECKING:
     from maglev_study.robustness.fleet import Campaign, Plan
@@ -23,7 +24,8 @@ if TYPE_CHECKING:
 
 DONE, WRONG_USE, INTERRUPTED = 0, 2, 130
 
-_PERIOD = 2.0  # least time between lines on progress [s]
+Work = Callable[[argparse.Namespace], tuple[int, dict[str, Any]]]
+"""From options to an exit code and what else is to be told of the outcome."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -31,55 +33,85 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     0: all was flown; 2: wrong use, or no scheduler; 130: interrupted, what was flown is kept.
     """
-    options = _parser().parse_args(arguments)
-    for name in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS'):
-        os.environ.setdefault(name, '1')  # before NumPy: its libraries read it once
+    return command('robustness', _parser().parse_args(arguments), _flown)
+
+
+def command(name: str, options: argparse.Namespace, work: Work) -> int:
+    """Do the work of a command with ``--out``, and print its outcome for who wants it as JSON.
+
+    What is wrong in its use is said in a line, and is exit code 2.
+    """
+    for variable in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS'):
+        os.environ.setdefault(variable, '1')  # before NumPy: its libraries read it once
+    outcome: dict[str, Any] = {}
+    code, reason = WRONG_USE, ''
+    with talking(options):
+        try:
+            code, outcome = work(options)
+        except (ParameterError, MissingLibraryError) as error:
+            reason = str(error)
+        except OSError as error:
+            reason = error.strerror or str(error)
+    if reason:
+        print(f'{name}: error: {reason}', file=sys.stderr)
+    if options.json:
+        print(json.dumps({'passed': code == DONE, 'out': str(options.out), **outcome}))
+    return code
+
+
+def _flown(options: argparse.Namespace) -> tuple[int, dict[str, Any]]:
     from maglev_study.robustness.fleet import make_plan
 
-    try:
-        plan = make_plan(
-            options.params,
-            options.machines,
-            laws=options.law,
-            overlays=options.overlay,
-            seed=options.seed,
-        )
-        options.out.mkdir(parents=True, exist_ok=True)
-        if options.replay is not None:
-            return _write_machine(plan, options.replay, options.out)
-        return _fly(plan, options)
-    except (ParameterError, MissingLibraryError) as error:
-        reason = str(error)
-    except OSError as error:
-        reason = error.strerror or str(error)
-    print(f'robustness: error: {reason}', file=sys.stderr)
-    return WRONG_USE
+    plan = make_plan(
+        options.params,
+        options.machines,
+        laws=options.law,
+        names=options.experiment,
+        overlays=options.overlay,
+        seed=options.seed,
+    )
+    options.out.mkdir(parents=True, exist_ok=True)
+    if options.replay is not None:
+        return _write_machine(plan, options.replay, options.out)
+    return _fly(plan, options)
 
 
-def _fly(plan: Plan, options: argparse.Namespace) -> int:
+def _fly(plan: Plan, options: argparse.Namespace) -> tuple[int, dict[str, Any]]:
     from maglev_study.robustness.fleet import fly_plan
     from maglev_study.robustness.outcome import groups
     from maglev_study.robustness.page import survivors
 
-    progress = _Progress()
+    progress = Progress('robustness', 'flown')
+
+    def heard(done: int, wanted: int, _: Sequence[Flown]) -> None:
+        progress.tell(done, wanted)
+
     campaign = fly_plan(
-        plan, options.out, jobs=options.jobs, scheduler=options.scheduler, heard=progress
+        plan, options.out, jobs=options.jobs, scheduler=options.scheduler, heard=heard
     )
+    progress.end()
     laws = [one.name for one in plan.contestants]
-    for experiment, *cells in survivors(groups(campaign), laws):
+    table = survivors(groups(campaign), laws)
+    for experiment, *cells in table:
         for law, cell in zip(laws, cells, strict=True):
             print(f'  {experiment:12}{law:20}{cell}')
-    for path in _leave(campaign, options):
+    files = _leave(campaign, options)
+    for path in files:
         print(f'  {path}')
+    outcome = {
+        'survivors': {row[0]: dict(zip(laws, row[1:], strict=True)) for row in table},
+        'files': [str(path) for path in files],
+    }
     if campaign.interrupted:
         print('robustness: interrupted; the same call with this --out goes on', file=sys.stderr)
-        return INTERRUPTED
-    return DONE
+        return INTERRUPTED, outcome
+    return DONE, outcome
 
 
 def _leave(campaign: Campaign, options: argparse.Namespace) -> list[Path]:
     """Write table and page; their paths."""
     from maglev_monitor.report.page import write_page
+    from maglev_study.robustness.guarantee import guarantees
     from maglev_study.robustness.page import render
     from maglev_study.robustness.table import write_table
 
@@ -93,12 +125,18 @@ def _leave(campaign: Campaign, options: argparse.Namespace) -> list[Path]:
     table, note = write_table(campaign, options.out)
     if note:
         print(f'robustness: csv in place of parquet: {note}')
-    path = options.out / 'robustness.html'
-    write_page(path, render(campaign, words, ' '.join(call)))
+    path, guaranteed = options.out / 'robustness.html', []
+    if not campaign.interrupted:
+        progress = Progress('robustness', 'margins')
+        guaranteed = guarantees(
+            plan, jobs=options.jobs, scheduler=options.scheduler, heard=progress.tell
+        )
+        progress.end()
+    write_page(path, render(campaign, words, ' '.join(call), guaranteed))
     return [path, table]
 
 
-def _write_machine(plan: Plan, number: int, out: Path) -> int:
+def _write_machine(plan: Plan, number: int, out: Path) -> tuple[int, dict[str, Any]]:
     from maglev_model.parameters import to_yaml
     from maglev_monitor.report.page import write_page
 
@@ -112,31 +150,12 @@ def _write_machine(plan: Plan, number: int, out: Path) -> int:
     with path.open('a', encoding='utf-8') as file:
         file.writelines(tables)
     print(f'machine {number}: {path}')
-    return DONE
+    return DONE, {'machine': number, 'files': [str(path)]}
 
 
-class _Progress:
-    """One line now and then."""
+def number(low: int, high: int) -> type[int]:
+    """What argparse makes a whole number within bounds by."""
 
-    def __init__(self) -> None:
-        self._started = time.monotonic()
-        self._told = 0.0
-        self._first = -1
-
-    def __call__(self, done: int, wanted: int, new: Sequence[Flown]) -> None:
-        """Hear of what has been flown."""
-        if self._first < 0:
-            self._first = done
-        now = time.monotonic()
-        if now - self._told < _PERIOD and done < wanted:
-            return
-        self._told = now
-        spent, fresh = now - self._started, done - self._first
-        left = f', about {spent / fresh * (wanted - done):.0f} s left' if fresh else ''
-        print(f'robustness: {done} of {wanted} flown, {spent:.0f} s{left}', flush=True)
-
-
-def _number(low: int, high: int) -> type[int]:
     def check(text: str) -> int:
         if not text.isdecimal() or not low <= int(text) <= high:
             raise argparse.ArgumentTypeError(f"'{text}' is no whole number from {low} to {high}")
@@ -157,13 +176,15 @@ def _parser() -> argparse.ArgumentParser:
         metavar='FILE',
         help="parameters of plant, controller and distributions over every law's own; repeatable",
     )
-    add('--machines', type=_number(1, 10**6), default=200, metavar='N', help='how many')
+    add('--machines', type=number(1, 10**6), default=200, metavar='N', help='how many')
     add('--law', nargs='+', default=['default'], metavar='NAME', help='the laws (default: default)')
-    add('--seed', type=_number(0, 2**53), default=0, metavar='S', help='of the machines')
-    add('--jobs', type=_number(1, 512), default=os.cpu_count() or 1, metavar='J', help='processes')
+    add('--experiment', nargs='+', default=[], metavar='NAME', help='what is flown (default: all)')
+    add('--seed', type=number(0, 2**53), default=0, metavar='S', help='of the machines')
+    add('--jobs', type=number(1, 512), default=os.cpu_count() or 1, metavar='J', help='processes')
     add('--scheduler', default='', metavar='ADDRESS', help='a Dask cluster, tcp://host:8786')
-    add('--replay', type=_number(0, 10**6), metavar='N', help='write one machine for the graph')
+    add('--replay', type=number(0, 10**6), metavar='N', help='write one machine for the graph')
     add('--out', type=Path, default=Path('robustness'), metavar='DIR', help='where results are')
+    add_output_options(parser)
     return parser
 
 

@@ -12,7 +12,7 @@ from scipy.stats import spearmanr
 
 from maglev_model.axes import AXES, FloatArray
 from maglev_study.robustness.draw import NOMINAL
-from maglev_study.robustness.experiments import Experiment, experiments
+from maglev_study.robustness.experiments import Experiment
 from maglev_study.robustness.fleet import Campaign
 from maglev_study.robustness.fly import LOST, UNSETTLED, Flown
 
@@ -92,7 +92,7 @@ def groups(campaign: Campaign) -> list[Group]:
     """The flights by law and experiment; those of which the nominal machine was flown."""
     found = []
     for contestant in campaign.plan.contestants:
-        for experiment in experiments(contestant.plant.sample_time, contestant.tilts):
+        for experiment in campaign.plan.experiments(contestant):
             mine = tuple(
                 one
                 for one in campaign.flown

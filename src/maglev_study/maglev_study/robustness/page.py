@@ -8,11 +8,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from maglev_model.axes import AXES, FloatArray
-from maglev_study.paper import STEPS
+from maglev_model.paper import STEPS
+from maglev_study.robustness import margins_page
 from maglev_study.robustness.charts import distributions, fans, tornado
 from maglev_study.robustness.draw import NOMINAL
 from maglev_study.robustness.fleet import Campaign
 from maglev_study.robustness.fly import LOST
+from maglev_study.robustness.guarantee import Guarantees
 from maglev_study.robustness.outcome import (
     SHARES,
     Group,
@@ -32,7 +34,9 @@ NOTES = (
 )
 
 
-def render(campaign: Campaign, words: Sequence[str], replay: str) -> str:
+def render(
+    campaign: Campaign, words: Sequence[str], replay: str, guaranteed: Sequence[Guarantees] = ()
+) -> str:
     """The page as HTML; ``replay`` is the command that flies a machine, but for its number."""
     from maglev_monitor.report.chart import render as drawn_charts
     from maglev_monitor.report.page import bullets, header, html_table, page
@@ -56,18 +60,32 @@ def render(campaign: Campaign, words: Sequence[str], replay: str) -> str:
             _worst_rows(found, laws, replay),
         ),
         bullets('Lost', _lost(found)),
+        *_margins(guaranteed, found),
         '<h2>Figures</h2>',
         html_table(
             ['law', 'experiment', 'figure', 'nominal', *_shares(), 'worst', 'the paper'],
             [row for one in found for row in figures(one)],
         ),
-        *drawn_charts(charts),
+        *drawn_charts([*charts, *margins_page.charts(guaranteed, found)]),
         '<h2>What is drawn</h2>',
         html_table(
             ['parameter', '', 'distribution', 'centre', 'width', 'source'], _draws(campaign)
         ),
     ]
     return page('Robustness', parts)
+
+
+def _margins(guaranteed: Sequence[Guarantees], found: Sequence[Group]) -> list[str]:
+    from maglev_monitor.report.page import bullets, html_table
+
+    if not guaranteed:
+        return []
+    return [
+        '<h2>Guaranteed margins</h2>',
+        html_table(margins_page.HEADS, margins_page.rows(guaranteed)),
+        bullets('Beside the flights', margins_page.words(guaranteed, found)),
+        bullets('What it says', margins_page.NOTES),
+    ]
 
 
 def verdict(campaign: Campaign, found: Sequence[Group]) -> str:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from std_srvs.srv import SetBool, Trigger
 
+from maglev_msgs.srv import Step
 from maglev_node.node import MaglevNode
 from maglev_node.topics import CURRENTS, MEASUREMENT, REFERENCE
 
@@ -22,14 +23,15 @@ class Call(NamedTuple):
     @property
     def kind(self) -> Any:
         """The type of the service."""
-        return SetBool if self.service == 'enable' else Trigger
+        return {'enable': SetBool, 'step': Step}.get(self.service, Trigger)
 
 
 class Wish(NamedTuple):
-    """What to call in turn: all of it, or only until one call succeeds."""
+    """What to call in turn: all of it, or only until one call succeeds; and with which values."""
 
     calls: tuple[Call, ...]
     one_is_enough: bool = False
+    values: Mapping[str, object] = {}
 
 
 WISHES = {
@@ -41,7 +43,8 @@ WISHES = {
         one_is_enough=True,
     ),
     'Reset': Wish((Call(MEASUREMENT, 'reset'), Call(CURRENTS, 'reset'))),
-    'Enable': Wish((Call(CURRENTS, 'enable'),)),
+    'Enable': Wish((Call(CURRENTS, 'enable'),), values={'data': True}),
+    'Step': Wish((Call(REFERENCE, 'step'),)),
 }
 """By the buttons' labels."""
 
@@ -68,10 +71,12 @@ class Operator:
             if client is None or client.srv_name != name:
                 self._clients[call] = self._node.create_client(call.kind, name)
 
-    def ask(self, wish: str) -> None:
-        """Begin with what is wished."""
+    def ask(self, wish: str, values: Mapping[str, object]) -> None:
+        """Begin with what is wished, with these values of its calls and the wish's own."""
         self._tell(f'{wish} …')
-        self._errands.append(_Errand(WISHES[wish], self._clients))
+        known = WISHES[wish]
+        wanted = known._replace(values={**known.values, **values})
+        self._errands.append(_Errand(wanted, self._clients))
 
     def go_on(self) -> None:
         """Take the answers that have come and make the next calls."""
@@ -114,8 +119,8 @@ class _Errand:
             self._end(f'nobody offers {call.service} beside {call.topic}', success=False)
             return
         request = call.kind.Request()
-        if call.kind is SetBool:
-            request.data = True
+        for name, value in self._wish.values.items():
+            setattr(request, name, value)
         self._name, self._deadline = client.srv_name, time.monotonic() + call.patience
         self._future = client.call_async(request)
 

@@ -95,7 +95,7 @@ class WebNode(MaglevNode[WebNodeParameters]):
                 self.fail(str(error))
                 return
         while not self._page.wishes.empty():
-            self._operator.ask(self._page.wishes.get())
+            self._operator.ask(*self._page.wishes.get())
         self._operator.go_on()
         self._page.show(self._live)
 

@@ -31,6 +31,8 @@ class StageScene:
             f'/{STAGE}/reference', axes_length=0.12, axes_radius=0.003, visible=False
         )
         self._stators = _add_boxes(scene, machine)
+        self._shown: dict[int, tuple[int, int, int]] = {}
+        self._scene = scene
         for motor in motors(machine):
             x, y, _ = motor.position
             where = (x, y, 0.12)
@@ -53,11 +55,17 @@ class StageScene:
                 frame.position, frame.wxyz = position, (w, x, y, z)
         self._reference.visible = reference is not None
 
+    def say(self, text: str) -> None:
+        """Write a line above the stage."""
+        self._scene.add_label(f'/{STAGE}/text', text, position=(0.0, 0.0, 0.25))
+
     def colour(self, shares: Iterable[float]) -> None:
         """Colour the stators by the shares of the limit that their currents use."""
         for motor, share in enumerate(shares, 1):
             if motor in self._stators:
-                self._stators[motor].color = _bytes(colour_of(share))
+                shown = _bytes(colour_of(share))
+                if shown != self._shown.get(motor):
+                    self._shown[motor] = self._stators[motor].color = shown
 
     def draw(self, flown: Sequence[Vector], planned: Sequence[Vector]) -> None:
         """Draw both paths [m]."""

@@ -1,12 +1,13 @@
-"""Accuracy and repeatability of positioning, bidirectional, as ISO 230-2 defines them."""
+"""Accuracy and repeatability of positioning, bidirectional, as ISO 230-2 defines them. No ROS."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from maglev_model.axes import FloatArray
+FloatArray = NDArray[np.float64]
 
 
 class Repeatability(NamedTuple):
@@ -30,15 +31,18 @@ def repeatability(upward: FloatArray, downward: FloatArray) -> Repeatability:
             'upward and downward must have one shape (targets, approaches), with two approaches or '
             f'more, not {upward.shape} and {downward.shape}'
         )
-    up, down = upward.mean(axis=1), downward.mean(axis=1)
-    s_up, s_down = upward.std(axis=1, ddof=1), downward.std(axis=1, ddof=1)
+    mean = np.stack([upward.mean(axis=1), downward.mean(axis=1)])
+    return of_moments(mean, np.stack([upward.std(axis=1, ddof=1), downward.std(axis=1, ddof=1)]))
+
+
+def of_moments(mean: FloatArray, deviation: FloatArray) -> Repeatability:
+    """From means and standard deviations (2, targets), approached from below, then from above."""
+    (up, down), (s_up, s_down) = mean, deviation
     spread = np.maximum(2.0 * (s_up + s_down) + np.abs(up - down), 4.0 * np.maximum(s_up, s_down))
-    high = np.maximum(up + 2.0 * s_up, down + 2.0 * s_down).max()
-    low = np.minimum(up - 2.0 * s_up, down - 2.0 * s_down).min()
     return Repeatability(
         bidirectional=float(spread.max()),
         reversal=float(np.abs(up - down).max()),
         bias=float(np.abs(0.5 * (up + down)).max()),
-        three_sigma=float(3.0 * np.maximum(s_up, s_down).max()),
-        accuracy=float(high - low),
+        three_sigma=float(3.0 * deviation.max()),
+        accuracy=float((mean + 2.0 * deviation).max() - (mean - 2.0 * deviation).min()),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 
@@ -24,6 +25,18 @@ class PublishedTracking(NamedTuple):
     title: str
     mean_error: dict[str, float]
 
+
+class Ellipse(NamedTuple):
+    """The ellipse of section IV-B: a circle in x and z, on which y and theta follow x and z."""
+
+    radius: float  # [m]
+    frequency: float  # [rad/s]
+    gap: float  # y where x is 0 [m]
+    climb: float  # of y over x
+    tilt: float  # of theta over z, in 4DOF [rad/m]
+
+
+ELLIPSE = Ellipse(radius=0.03, frequency=1.5 * math.pi, gap=0.025, climb=1.0 / 6.0, tilt=1.0 / 3.0)
 
 STEPS = (
     PublishedStep('y', 0.020, 0.027, '14.3 %', '< 3 s', 'about 5 s'),

@@ -1,0 +1,207 @@
+"""The scripts that hand over to a program of the workspace, which has the terminal to itself."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from functools import partial
+from typing import NoReturn
+
+from runner.common_options import OUTPUT, Job, as_given, out_folder, out_option, talk
+from runner.graph import Flight, Scenario
+from runner.options import Command, Option, WrongUseError, whole
+from runner.overlays import DISTRIBUTIONS, PARAMS, SECTIONS, check_overlay, overlay
+from runner.process import installed, program, run_to_end
+from runner.run import fly
+from runner.signals import Signals
+from runner.texts import COMMISSION, COMPARE, FAULTS, ROBUSTNESS, TUNE
+
+EXPERIMENT = Option(
+    'only these: ellipse, forces, step_y, step_x, step_theta, scan, hold',
+    'EXPERIMENT...',
+    several=True,
+)
+HEARD_BY_COMPARE = ('controller', 'plant', '**')
+HEARD_BY_ROBUSTNESS = (*HEARD_BY_COMPARE, DISTRIBUTIONS)
+
+
+def _compare(options: Sequence[str]) -> Job:
+    laws = 'only these: files of params/laws, paper, default, or a file of your own, my_law.yaml'
+    bandwidth = 'crossover of the laws with compensators, on all axes (default: as in their files)'
+    table = {
+        '--params': Option(
+            "parameters of controller and plant on top of every law's own, from the current\n"
+            'folder or from params/; repeatable, the last one wins',
+            'OVERLAY.yaml',
+            overlay,
+        ),
+        '--out': out_option('the results are', 'compare'),
+        '--quick': Option('coarse regions and short windows'),
+        '--laws': Option(laws, 'NAME...', several=True),
+        '--bandwidth': Option(bandwidth, 'RAD_S'),
+        **OUTPUT,
+    }
+    given = Command('compare.sh', COMPARE, table).parse(options)
+    arguments = ['--params', str(PARAMS), '--out', str(out_folder('compare', given))]
+    arguments += as_given(given, '--quick', '--laws', '--bandwidth', *OUTPUT)
+    overlays = given.get('--params', [])
+    for file in overlays:
+        arguments += ['--overlay', file]
+    return partial(_become, 'maglev_study', 'compare', arguments, overlays, HEARD_BY_COMPARE)
+
+
+def _faults(options: Sequence[str]) -> Job:
+    table = {
+        '--runs': Option('how many runs (default 3000)', 'N', whole),
+        '--seed': Option('of the first run; the others count up (default 0)', 'S', whole),
+        '--jobs': Option('processes (default: one for each core)', 'J', whole),
+        '--double': Option('a second fault up to 0.5 s after the first'),
+        '--short': Option('one run of each cell of fault and phase'),
+        '--replay': Option(
+            'fly one run alone and draw it: fault, detection, landing', 'SEED|FILE.json'
+        ),
+        '--out': out_option('the page is', 'faults'),
+        **OUTPUT,
+    }
+    given = Command('faults.sh', FAULTS, table).parse(options)
+    arguments = ['--out', str(out_folder('faults', given))]
+    names = ('--runs', '--seed', '--jobs', '--double', '--short', '--replay', *OUTPUT)
+    arguments += as_given(given, *names)
+    return partial(_become, 'maglev_study', 'faults', arguments)
+
+
+def _robustness(options: Sequence[str]) -> Job:
+    name = 'robustness'
+    table = {
+        '--machines': Option('how many are drawn (default 200)', 'N', whole),
+        '--params': Option(
+            "parameters of plant, controller and distributions on top of every law's own, from\n"
+            'the current folder or from params/; repeatable, the last one wins',
+            'OVERLAY.yaml',
+            overlay,
+        ),
+        '--law': Option(
+            'files of params/laws, paper, default (default: default)', 'NAME...', several=True
+        ),
+        '--experiment': EXPERIMENT,
+        '--seed': Option('of the machines (default 0)', 'S', whole),
+        '--jobs': Option('processes (default: one for each core)', 'J', whole),
+        '--scheduler': Option('a Dask cluster to fly on, tcp://HOST:8786', 'ADDRESS'),
+        '--replay': Option('fly machine N through the graph; 0 is the nominal one', 'N', whole),
+        '--out': out_option('the results are', name),
+        **OUTPUT,
+    }
+    given = Command(f'{name}.sh', ROBUSTNESS, table).parse(options)
+    out, overlays = out_folder(name, given), given.get('--params', [])
+    arguments = ['--params', str(PARAMS), '--out', str(out)]
+    arguments += as_given(given, '--machines', '--seed', '--jobs', '--scheduler', '--replay')
+    for several in ('--law', '--experiment'):
+        arguments += [several, *given[several]] if several in given else []
+    for file in overlays:
+        arguments += ['--overlay', file]
+    if '--replay' in given:
+        talk(given)
+        arguments += ['--quiet'] if {'--quiet', '--json'} & set(given) else []
+        machine = Flight(
+            Scenario('ellipse_4dof', ('scenario_ellipse_4dof.yaml',)),
+            out=out,
+            overlays=(str(out / f'machine-{int(given["--replay"][-1])}.yaml'),),
+            as_json='--json' in given,
+        )
+        return partial(_replay_machine, machine, arguments, overlays)
+    arguments += as_given(given, *OUTPUT)
+    return partial(_become, 'maglev_study', name, arguments, overlays, HEARD_BY_ROBUSTNESS)
+
+
+def _tune(options: Sequence[str]) -> Job:
+    name = 'tune'
+    table = {
+        '--machines': Option('how many are drawn (default 40)', 'N', whole),
+        '--trials': Option('how many numbers are tried (default 60)', 'N', whole),
+        '--margin': Option(
+            'gain that all currents at once must be guaranteed, up and down (default 6.0)', 'DB'
+        ),
+        '--params': Option(
+            "parameters of plant, controller and distributions on top of the law's own, from\n"
+            'the current folder or from params/; repeatable, the last one wins',
+            'OVERLAY.yaml',
+            overlay,
+        ),
+        '--law': Option('the law that is tuned (default: default)', 'LAW'),
+        '--experiment': EXPERIMENT,
+        '--seed': Option('of machines and search (default 0)', 'S', whole),
+        '--jobs': Option('processes (default: one for each core)', 'J', whole),
+        '--scheduler': Option('a Dask cluster to fly on, tcp://HOST:8786', 'ADDRESS'),
+        '--out': out_option('tuned.yaml is', name),
+        **OUTPUT,
+    }
+    given = Command(f'{name}.sh', TUNE, table).parse(options)
+    overlays = given.get('--params', [])
+    arguments = ['--params', str(PARAMS), '--out', str(out_folder(name, given))]
+    passed = set(table) - {'--params', '--out'}
+    arguments += as_given(given, *sorted(passed))
+    for file in overlays:
+        arguments += ['--overlay', file]
+    return partial(_become, 'maglev_study', name, arguments, overlays, HEARD_BY_ROBUSTNESS)
+
+
+def _replay_machine(machine: Flight, arguments: Sequence[str], overlays: Sequence[str]) -> int:
+    """Have the parameters of a machine written, then fly the graph with them over the overlays'."""
+    under = []
+    for path in overlays:
+        check_overlay(path, sections=HEARD_BY_ROBUSTNESS)
+        with suppress(WrongUseError):  # of distributions alone: no node hears it
+            check_overlay(path)
+            under.append(path)
+    signals = Signals()
+    code = run_to_end([*program('maglev_study', 'robustness'), *arguments], signals)
+    if code or signals.code:
+        return code or signals.code
+    return fly(machine._replace(overlays=(*under, *machine.overlays)), signals)
+
+
+def _commission(options: Sequence[str]) -> Job:
+    where = 'parameters of hw_bridge, from the current folder or from params/;'
+    current = 'largest current of a phase alone, 0.2 to 3 A (default 1.5)'
+    table = {
+        '--params': Option(f'{where}\nrepeatable, the last one wins', 'OVERLAY.yaml', overlay),
+        '--current': Option(current, 'A'),
+        '--yes': Option('do not ask before each step'),
+        **OUTPUT,
+    }
+    given = Command('commission.sh', COMMISSION, table).parse(options)
+    overlays = given.get('--params', [])
+    files = [PARAMS / name for name in ('machine.yaml', 'hw_bridge.yaml')]
+    arguments = []
+    for file in [*(str(file) for file in files if file.is_file()), *overlays]:
+        arguments += ['--params', file]
+    arguments += as_given(given, '--current', '--yes', *OUTPUT)
+    return partial(_become, 'maglev_hw_bridge', 'commission', arguments, overlays)
+
+
+def _become(
+    package: str,
+    executable: str,
+    arguments: Sequence[str],
+    overlays: Sequence[str] = (),
+    heard: Sequence[str] = SECTIONS,
+) -> NoReturn:
+    """Go on as another program, which has the terminal and its signals to itself.
+
+    It hears those sections of the overlays.
+    """
+    for path in overlays:
+        check_overlay(path, sections=heard)
+    path = installed(package, executable)
+    os.execv(path, [path, *arguments])
+
+
+PROGRAMS: dict[str, Callable[[Sequence[str]], Job]] = {
+    'compare': _compare,
+    'faults': _faults,
+    'robustness': _robustness,
+    'tune': _tune,
+    'commission': _commission,
+}
+"""By the scripts' names."""

@@ -1,0 +1,72 @@
+"""A function over many tasks: in this process, in processes here, or on a Dask cluster."""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, TypeVar
+
+import joblib
+
+from maglev_model.optional import MissingLibraryError, needed
+from maglev_study.closed_loop import warm_up
+
+T = TypeVar('T')
+
+PATIENCE = 10.0
+"""For a scheduler to answer [s]."""
+
+
+def results(
+    function: Callable[..., T],
+    tasks: Sequence[tuple[Any, ...]],
+    *,
+    jobs: int = 1,
+    scheduler: str = '',
+) -> Iterator[T]:
+    """What ``function`` makes of each of the ``tasks``, its arguments, in the order they are done.
+
+    In processes of their own with more than one of ``jobs``; with a ``scheduler`` on that Dask
+    cluster, where what a worker had that died is given to another. One thread a process.
+
+    Raises what the function raises, OSError where the scheduler cannot be reached or gives up, and
+    :class:`~maglev_model.optional.MissingLibraryError` for a scheduler without Dask, and for
+    workers without these packages.
+    """
+    if not tasks:
+        return
+    if scheduler:
+        yield from _on_cluster(function, tasks, scheduler)
+        return
+    warm_up()  # compiled once, before there are processes
+    with joblib.parallel_config('loky', n_jobs=jobs, inner_max_num_threads=1):
+        parallel = joblib.Parallel(return_as='generator_unordered', batch_size=1)
+        yield from parallel(joblib.delayed(_undisturbed)(function, task) for task in tasks)
+
+
+def _undisturbed(function: Callable[..., T], task: tuple[Any, ...]) -> T:
+    """Leave Ctrl-C to whoever started this process."""
+    if threading.current_thread() is threading.main_thread() and multiprocessing.parent_process():
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    return function(*task)
+
+
+def _on_cluster(
+    function: Callable[..., T], tasks: Sequence[tuple[Any, ...]], scheduler: str
+) -> Iterator[T]:
+    with needed('distributed', '--scheduler'):
+        from distributed import Client, KilledWorker, as_completed
+        from distributed.client import FutureCancelledError
+    with Client(scheduler, timeout=PATIENCE) as client:
+        futures = client.map(function, *zip(*tasks, strict=True), pure=False)
+        try:
+            for future in as_completed(futures):
+                yield future.result()
+        except ModuleNotFoundError as error:
+            raise MissingLibraryError(
+                f'a worker of {scheduler} lacks {error.name}: install the packages there as here'
+            ) from error
+        except (FutureCancelledError, KilledWorker) as error:
+            raise OSError(f'the cluster at {scheduler} gave up: {error}') from error

@@ -1,0 +1,64 @@
+"""Whether the machine itself keeps time: a thread of real-time priority on every processor.
+
+A kernel or a hypervisor takes a processor away for 50 ms and more, from SCHED_FIFO too. What flies
+in real time is lost then, whatever the software does.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+import time
+from typing import Self
+
+from maglev_node.realtime import take_priority
+
+TOLERATED = 0.004  # by which a thread may be late on a machine that keeps time [s]
+_PERIOD = 0.002
+
+
+class Witness:
+    """Watches from entry to exit; ``worst`` is by how much a thread was late [s]."""
+
+    def __init__(self) -> None:
+        self.worst = 0.0
+
+    def __enter__(self) -> Self:
+        self._process = subprocess.Popen(
+            [sys.executable, __file__], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+        assert self._process.stdout.readline() == 'watching\n'
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        said, _ = self._process.communicate()  # the end of its input ends it
+        self.worst = float(said)
+
+    @property
+    def disturbed(self) -> bool:
+        """Whether the machine did not keep time."""
+        return self.worst > TOLERATED
+
+
+def _main() -> None:
+    take_priority(98)
+    late = dict.fromkeys(os.sched_getaffinity(0), 0.0)
+
+    def watch(processor: int) -> None:
+        os.sched_setaffinity(0, {processor})
+        while True:
+            due = time.monotonic() + _PERIOD
+            time.sleep(_PERIOD)
+            late[processor] = max(late[processor], time.monotonic() - due)
+
+    for processor in late:
+        threading.Thread(target=watch, args=(processor,), daemon=True).start()
+    print('watching', flush=True)
+    sys.stdin.read()
+    print(max(late.values()))
+
+
+if __name__ == '__main__':
+    _main()
