@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import signal
 from pathlib import Path
 
@@ -9,14 +10,13 @@ import browser
 import pytest
 from flight import LONG, airborne, fly, landed_without_current, samples
 from graph import Nodes, Observer, Process
-from page_client import PageClient
+from page_client import PageClient, heights
 
 from maglev_msgs.msg import ControllerState
 from maglev_node.topics import CONTROLLER_STATE
 from maglev_view.parameters import WebParameters
 from maglev_view.web.page import Page
 
-PLATEN = '/stage_link/platen_link'
 AT_REST = -0.031
 
 needs_browser = pytest.mark.skipif(
@@ -42,37 +42,30 @@ def mode(observer: Observer) -> int:
     return int(observer.newest(CONTROLLER_STATE).mode)
 
 
-def heights(page: PageClient) -> list[float]:
-    """Where the platen was put, one after the other [m]."""
-    moved = [m for m in page.of('SetPositionMessage') if m['name'] == PLATEN]
-    return [message['position'][2] for message in moved]
-
-
 def test_the_page_shows_the_flight_and_its_buttons_act(flying: Process, watching: Observer) -> None:
-    page = PageClient(address(flying), origin=address(flying))
-    page.wait(lambda: len(set(heights(page))) > 5)
-    assert all(AT_REST - 1e-4 < z < -0.018 for z in heights(page))
-    page.wait(lambda: 'controller regulating' in page.text() and 'motor 4' in page.text())
+    with PageClient(address(flying), origin=address(flying)) as page:
+        page.wait(lambda: len(set(heights(page.messages))) > 5)
+        assert all(AT_REST - 1e-4 < z < -0.018 for z in heights(page.messages))
+        page.wait(lambda: 'controller regulating' in page.text() and 'motor 4' in page.text())
 
-    page.press('Emergency stop')
-    watching.wait(lambda: mode(watching) == ControllerState.FAULT)
-    watching.wait(lambda: landed_without_current(watching))
-    page.wait(lambda: '<b>controller</b>: FAULT' in page.text())
-    stranger = PageClient(address(flying), origin='https://elsewhere.example')
-    stranger.wait(lambda: stranger.buttons())
-    stranger.press('Reset')
-    stranger.wait(lambda: 'refused: this page' in stranger.text())
-    assert mode(watching) == ControllerState.FAULT
-    stranger.close()
-    page.press('Reset')
-    watching.wait(lambda: mode(watching) == ControllerState.DISABLED)
-    page.press('Enable')
-    watching.wait(lambda: mode(watching) == ControllerState.WAITING)
-    page.press('Step')
-    page.wait(lambda: '/reference/step: step refused: the reference does not hover' in page.text())
-    page.press('Lift off')
-    watching.wait(lambda: airborne(watching))
-    page.close()
+        page.press('Emergency stop')
+        watching.wait(lambda: mode(watching) == ControllerState.FAULT)
+        watching.wait(lambda: landed_without_current(watching))
+        page.wait(lambda: '<b>controller</b>: FAULT' in page.text())
+        with PageClient(address(flying), origin='https://elsewhere.example') as stranger:
+            stranger.wait(lambda: stranger.buttons())
+            stranger.press('Reset')
+            stranger.wait(lambda: 'refused: this page' in stranger.text())
+            assert mode(watching) == ControllerState.FAULT
+        page.press('Reset')
+        watching.wait(lambda: mode(watching) == ControllerState.DISABLED)
+        page.press('Enable')
+        watching.wait(lambda: mode(watching) == ControllerState.WAITING)
+        page.press('Step')
+        refusal = '/reference/step: step refused: the reference does not hover'
+        page.wait(lambda: refusal in page.text())
+        page.press('Lift off')
+        watching.wait(lambda: airborne(watching))
     flying.signal(signal.SIGKILL)
     assert flying.wait() == 137
     samples(watching, 500)
@@ -81,14 +74,12 @@ def test_the_page_shows_the_flight_and_its_buttons_act(flying: Process, watching
 
 def test_the_fields_of_the_page_go_with_its_step() -> None:
     page = Page(WebParameters(port=0), 'test')
-    client = PageClient(page.address, origin=page.address)
-    client.wait(lambda: 'Step' in client.buttons())
-    client.press('Step')
-    assert page.wishes.get(timeout=10.0) == ('Step', {'axis': 'x', 'distance': 1e-4})
-    client.press('Land')
-    assert page.wishes.get(timeout=10.0) == ('Land', {})
-    client.close()
-    page.close()
+    with contextlib.closing(page), PageClient(page.address, origin=page.address) as client:
+        client.wait(lambda: 'Step' in client.buttons())
+        client.press('Step')
+        assert page.wishes.get(timeout=10.0) == ('Step', {'axis': 'x', 'distance': 1e-4})
+        client.press('Land')
+        assert page.wishes.get(timeout=10.0) == ('Land', {})
 
 
 @pytest.mark.long

@@ -4,17 +4,25 @@ from __future__ import annotations
 
 import socket
 import time
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Iterable
+from typing import Any, Self
 
 import msgspec
 import viser
 import zstandard
 from websockets.sync.client import connect
 
+from maglev_view.frames import PLATEN, STAGE
+
+
+def heights(messages: Iterable[dict[str, Any]]) -> list[float]:
+    """Where messages put the platen, one after the other, the stators' face at zero [m]."""
+    moved = [m for m in messages if m['type'] == 'SetPositionMessage']
+    return [m['position'][2] for m in moved if m['name'] == f'/{STAGE}/{PLATEN}']
+
 
 class PageClient:
-    """What a page would know.
+    """What a page would know; leaves at the end of a ``with``.
 
     :param address: of the page, ``http://127.0.0.1:8080``.
     :param origin: the site that a browser would name as the page's, None for no browser.
@@ -29,6 +37,12 @@ class PageClient:
         )
         self.messages: list[dict[str, Any]] = []
         self._socket.send(msgspec.msgpack.encode(self._camera()))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
     def read(self, duration: float) -> None:
         """Take what comes for some time [s]."""
