@@ -75,6 +75,7 @@ class GuardArrays(ObserverArrays):
     rigid: bool  # whether four believed gaps must be those of a rigid platen
     residual_then: Annotated[FloatArray, 4]  # when a gap encoder counted last [m]
     unseen: Annotated[FloatArray, 6]  # how far it should have moved at least since its last count
+    silent: Annotated[NDArray[np.int64], 2]  # samples in flight in which x, z have not counted
     answered: Annotated[NDArray[np.int8], 4]  # gaps that have counted since the platen rested
     left: Annotated[FloatArray, 4]  # and by how much, leaps aside [m]
 
@@ -150,6 +151,10 @@ def _look(g: GuardArrays, flying: bool, counted: Flags) -> None:
             g.unseen[i] += _least_step(g, i)
         if i < 4 and (counted[i] or not g.rigid):
             g.residual_then[i] = residual
+        if i >= 4:
+            asked = flying and g.samples >= _SETTLING and g.trust[i] != LOST
+            asked = asked and not (counted[i] or observer.supported(g, Y))
+            g.silent[i - 4] = g.silent[i - 4] + 1 if asked else 0
         g.probation[i] = max(g.probation[i] - 1, 0)
 
 
@@ -338,6 +343,17 @@ def watch(block: Block, length: FloatArray, current: FloatArray, flying: bool) -
     return code, index
 
 
+@compiled
+def lose(block: Block, encoder: int) -> None:
+    """See :meth:`Guard.lose`."""
+    g: GuardArrays = block[0]
+    g.trust[encoder] = LOST
+    for i in range(6):
+        g.blamed[i] = 1 if i == encoder else 0
+    g.position[encoder - 3] = g.believed[encoder]
+    g.rate[encoder - 3] = g.disturbance[encoder - 3] = 0.0
+
+
 class Guard:
     """Watches the encoders; :attr:`arrays` serve compiled code."""
 
@@ -360,6 +376,7 @@ class Guard:
         g = self.arrays
         g.samples = g.contradictions = 0
         g.unseen[:] = g.rate[:] = 0.0
+        g.silent[:] = 0
 
     def trust(self) -> None:
         """Believe every encoder again: they have just been homed."""
@@ -371,6 +388,10 @@ class Guard:
     def watch(self, length: FloatArray, current: FloatArray, flying: bool) -> tuple[int, int]:
         """Judge one sample; see :func:`watch`."""
         return watch(self.arrays.block, length, current, flying)
+
+    def lose(self, encoder: int) -> None:
+        """Do without an encoder, x (4) or z (5), from now on; its axis rests where it was read."""
+        lose(self.arrays.block, encoder)
 
     @property
     def residual(self) -> float:

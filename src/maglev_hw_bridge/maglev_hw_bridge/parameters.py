@@ -79,6 +79,13 @@ class FaultParameters:
         unit='m',
         within=(1e-6, 0.1),
     )
+    silence: float = parameter(
+        0.2,
+        'x or z that has not counted for so long in flight is asked whether it does, by a push to '
+        'and fro that moves it by about one count; 0: never',
+        unit='s',
+        within=(0.0, 60.0),
+    )
     friction: tuple[float, ...] = parameter(
         (0.8, 0.35, 0.35, 3.0, 3.0),
         'by how much the force on a platen that stands still may differ from the model, friction '

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from maglev_hw_bridge import amplifiers, faults, guard
 from maglev_hw_bridge.drivers import Driver, DriverError, Truthful
+from maglev_hw_bridge.knock import Knock
 from maglev_hw_bridge.landing import Landing
 from maglev_hw_bridge.life_cycle import StageLife
 from maglev_hw_bridge.mode import Mode as Mode
@@ -46,6 +47,7 @@ class BridgeStage(StageLife):
         self.late_ticks = 0
         self._all_knowing = self.driver if isinstance(self.driver, Truthful) else None
         self.landing = Landing(self.parameters)
+        self._knock = Knock(self.parameters)
         self._zero = np.zeros(4)
         self._lower_stop = self.parameters.machine.gap_max
         self._stale_samples = round(self.parameters.fault.stale / self.sample_time)
@@ -74,7 +76,8 @@ class BridgeStage(StageLife):
         self.encoders.decode(self._counts)
         self.amplifiers.drive(self._zero, self._zero, 0.0, 0.0)
         faults.consequence_of_cut(self.parameters, self.guard)
-        self.guard.forget()
+        self.guard.lose(4)
+        self.guard.trust()
 
     # -- samples -----------------------------------------------------------------------------------
 
@@ -104,6 +107,10 @@ class BridgeStage(StageLife):
         code, index = self.guard.watch(length, self.amplifiers.arrays.current, self.flying)
         if code != guard.FINE:
             self._sensing_fault(code, index)
+        silent = self._knock.look(self.guard.arrays, self.flying)
+        if silent is not None:
+            self.guard.lose(silent)
+            self._sensing_fault(guard.STUCK, silent)
         self._look_for_rest()
         if self.driver.stop_pressed:
             self._raise_fault('stop', 'the emergency stop is pressed', 'release it')
@@ -145,8 +152,7 @@ class BridgeStage(StageLife):
         if self.flying and not flows and not self._on_the_stop():
             self._raise_fault('controller', *faults.zero_fault(self.guard))
             return ''
-        x, z = self.guard.arrays.believed[4], self.guard.arrays.believed[5]
-        code, index = self.amplifiers.drive(i_d, i_q, x, z)
+        code, index = self._drive(i_d, i_q)
         if code in (amplifiers.FINE, amplifiers.SPENT):
             self._direct[:], self._quadrature[:] = i_d, i_q
             self.flying = flows
@@ -193,6 +199,12 @@ class BridgeStage(StageLife):
             except DriverError as error:
                 raise self._lose_boards(error) from error
 
+    def _drive(self, i_d: FloatArray, i_q: FloatArray) -> tuple[int, int]:
+        """Have the amplifiers make these currents where x and z are, and what is to knock there."""
+        state = self.guard.arrays
+        i_q = self._knock.added(state, i_d, i_q)
+        return self.amplifiers.drive(i_d, i_q, state.believed[4], state.believed[5])
+
     def _descend(self) -> None:
         state = self.guard.arrays
         self._landing_samples += 1
@@ -204,9 +216,7 @@ class BridgeStage(StageLife):
         if self.landing.astray:
             self._raise_fault('current', *faults.stray_fault(), cut=True)
             return
-        x, z = state.believed[4], state.believed[5]
-        i_d, i_q = self.landing.direct_current, self.landing.quadrature_current
-        code, _ = self.amplifiers.drive(i_d, i_q, x, z)
+        code, _ = self._drive(self.landing.direct_current, self.landing.quadrature_current)
         if code not in (amplifiers.FINE, amplifiers.SPENT):
             self._disable()
 

@@ -61,6 +61,17 @@ def test_the_same_run_at_another_time_is_equal(make_bag: MakeBag, capsys: Any) -
     assert any(line.startswith('  seconds: ') for line in lines)
 
 
+def test_a_bag_of_several_runs_is_refused(
+    tmp_path: Path, run: Any, messages: dict[str, list[bytes]], capsys: Any
+) -> None:
+    writer = open_bag(tmp_path / 'twice')
+    write_samples(writer, run, messages)
+    write_samples(writer, run, messages)
+    writer.close()
+    assert compare_bags([str(tmp_path / 'twice')] * 2) == UNREADABLE
+    assert "twice' holds several runs" in capsys.readouterr().err
+
+
 def test_a_difference_is_named_with_its_size_and_first_sample(
     make_bag: MakeBag, capsys: Any
 ) -> None:

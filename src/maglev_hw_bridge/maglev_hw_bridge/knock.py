@@ -1,0 +1,126 @@
+"""Asks x and z, when they have not counted for a while in flight, whether they count at all.
+
+At small gaps the motors are commutated so that they pull less than they would without current, and
+push a platen that is not where x or z says along, the harder the farther it is off: a stuck encoder
+ends in a run to a stop. Neither gaps nor model can tell in time, for friction may as well hold the
+platen. So one that seems to stand still is pushed, for some milliseconds to and fro, by what moves
+it one count in spite of the friction that there may be. Where nothing is counted then, it is pushed
+once more, twice as hard.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from maglev_hw_bridge.guard import GuardArrays
+from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_model.axes import FloatArray, X, Z
+from maglev_model.compiled import compiled
+from maglev_model.machine import Machine, machine_constants
+from maglev_model.platen import output_accelerations
+
+_PUSH = 8e-3  # in either direction [s]
+_COUNTS = 1.2  # by which the platen moves in it at least
+_LATE = 4  # samples in which a count may still come
+_HARDEST = 2  # times as hard, the second time
+
+
+@compiled
+def _thrust(machine: Machine, position: FloatArray, i_d: FloatArray, axis: int) -> float:
+    """Acceleration along x or z by 1 A of i_q in both of its motors [m/s²/A]."""
+    i_q = np.zeros(4)
+    rest = output_accelerations(machine, position[0], position[3], position[4], i_d, i_q)[axis]
+    i_q[2 - axis :: 2] = 1.0
+    push = output_accelerations(machine, position[0], position[3], position[4], i_d, i_q)[axis]
+    return float(push - rest)
+
+
+class _Asked:
+    """Knocks at x or at z."""
+
+    def __init__(self, axis: int, acceleration: float, duration: int) -> None:
+        self.axis = axis
+        self._acceleration, self._duration = acceleration, duration  # [m/s²], [samples]
+        self.under_way = False
+        self._samples = self._turn = 0  # of it, and after which the push turns round
+        self._hardness, self._sign, self._answered = 1, 1.0, False
+
+    def begin(self, sign: float, hardness: int = 1) -> None:
+        self.under_way, self._answered = True, False
+        self._samples, self._turn = 0, self._duration
+        self._sign, self._hardness = sign, hardness
+
+    def go_on(self, counted: bool) -> bool:
+        """One sample later; whether the platen must have moved and was not seen to."""
+        self._samples += 1
+        if counted and not self._answered:
+            self._answered, self._turn = True, min(self._turn, self._samples)
+        if self._samples < 2 * self._turn + (0 if self._answered else _LATE):
+            return False
+        self.under_way = False
+        if self._answered:
+            return False
+        if self._hardness < _HARDEST:
+            self.begin(self._sign, _HARDEST)
+            return False
+        return True
+
+    @property
+    def acceleration(self) -> float:
+        """To push with [m/s²]."""
+        push = self._sign * self._hardness * self._acceleration
+        if self._samples < self._turn:
+            return push
+        return -push if self._samples < 2 * self._turn else 0.0
+
+
+class Knock:
+    """Both axes: :meth:`look` once a sample, then :meth:`added` to what is commanded."""
+
+    def __init__(self, parameters: BridgeParameters) -> None:
+        fault, period = parameters.fault, parameters.sample_time
+        duration = max(round(_PUSH / period), 2)
+        self._patience = round(fault.silence / period)
+        self._limit = fault.command_limit
+        self._machine = machine_constants(parameters.machine)
+        self._i_q = np.zeros(4)
+        count = parameters.encoder.resolution
+        hover = np.array([parameters.machine.gap_min, 0.0, 0.0, 0.0, 0.0])
+        self._asked = tuple(
+            _Asked(
+                axis,
+                fault.friction[axis] + 2.0 * _COUNTS * count[3 + axis] / (duration * period) ** 2,
+                duration,
+            )
+            for axis in (X, Z)
+            if _thrust(self._machine, hover, np.zeros(4), axis)  # a single motor has none along z
+        )
+
+    def look(self, watched: GuardArrays, flying: bool) -> int | None:
+        """One sample; the encoder, 4 or 5, that does not count. Ends with the flight."""
+        for asked in self._asked:
+            asked.under_way = asked.under_way and flying
+            silent = watched.silent[asked.axis - X]
+            if asked.under_way:
+                if asked.go_on(silent == 0):
+                    return 3 + asked.axis
+            elif 0 < self._patience <= silent:
+                push = watched.acceleration[asked.axis] - watched.disturbance[asked.axis]
+                asked.begin(-1.0 if push < 0.0 else 1.0)
+        return None
+
+    def added(self, watched: GuardArrays, i_d: FloatArray, i_q: FloatArray) -> FloatArray:
+        """``i_q`` (4,) [A] with what knocks: none while the motors have nothing left for it."""
+        if not any(asked.under_way for asked in self._asked):
+            return i_q
+        self._i_q[:] = i_q
+        for asked in self._asked:
+            if not asked.under_way:
+                continue
+            thrust = _thrust(self._machine, watched.position, i_d, asked.axis)
+            self._i_q[2 - asked.axis :: 2] += asked.acceleration / thrust
+        if np.max(np.hypot(i_d, self._i_q)) <= self._limit:
+            return self._i_q
+        for asked in self._asked:
+            asked.under_way = False
+        return i_q
