@@ -8,8 +8,12 @@ from itertools import pairwise
 
 import pytest
 
+from maglev_hw_bridge.parameters import FaultParameters
+from maglev_model.machine import MachineParameters, machine_constants
+from maglev_model.motor import force_coefficients
 from maglev_study.faults.catalogue import KINDS
 from maglev_study.faults.draw import PER_MACHINE, cells, from_json, scenario, to_json
+from maglev_study.faults.machines import machine
 from maglev_study.faults.programme import PHASES, programme
 
 
@@ -65,3 +69,14 @@ def test_a_programme_has_all_phases_one_after_another(number: int) -> None:
         start, end = course.spans[phase]
         assert course.sample_of(phase, 0.0) == start
         assert course.sample_of(phase, 0.999999) == max(end - 1, start)
+
+
+def test_any_machine_can_be_held_by_its_currents_wherever_it_flies() -> None:
+    """At the least gap in flight a fifth of the weight can be left to the magnets, or less."""
+    believed = machine_constants(MachineParameters())
+    k_1, k_2, k_3, _ = force_coefficients(believed, FaultParameters().lower[0])
+    for number in range(1, 100):
+        true = machine(number).emulation.offset
+        least = true.K_v1 * k_1 - (true.K_v2 * k_2) ** 2 / (4.0 * true.K_v3 * k_3)
+        weight = true.mass_y * believed.M_y * believed.G
+        assert -1e-9 < 4.0 * least < 0.2 * weight

@@ -160,7 +160,7 @@ def _end(make: _Maker, *, by_bridge: bool) -> dict[int, str]:
     else:
         make.add(Phase.LAND, make.go(_REST, 1.5, 0.1))
         make.add(Phase.REST, make.stay(_REST, 0.1))
-        stop = len(make.kind)
+        stop = len(make.kind) - 1
     for third in range(3):
         begin = start + third * _THIRD
         make.spans[f'landing {third + 1}/3'] = (begin, begin + _THIRD)
