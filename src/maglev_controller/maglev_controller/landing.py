@@ -13,6 +13,8 @@ from maglev_controller.parameters import ControllerParameters
 from maglev_model.axes import AXES, FloatArray
 from maglev_model.quintic import braking_times, quintic_to_zero
 
+_OFF_THE_STOPS = 0.03  # share of its way that an axis keeps off its stops: a bridge lands from 0.02
+
 
 class Landing:
     """A smooth way from any reference to rest on the lower stop; arrays in output order, (5,).
@@ -47,7 +49,7 @@ class Landing:
 
     def _resting_place(self, lower: FloatArray, upper: FloatArray) -> FloatArray:
         """Where braking ends: halfway what the velocity would cover, off the stops, tilts level."""
-        margin = 0.02 * (upper - lower)
+        margin = _OFF_THE_STOPS * (upper - lower)
         coasted = self._start + 0.5 * self._brakes * self._velocity
         least, most = lower + margin, upper - margin
         most[0] = upper[0]
