@@ -85,7 +85,7 @@ class Knock:
         self._machine = machine_constants(parameters.machine)
         self._i_q = np.zeros(4)
         count = parameters.encoder.resolution
-        hover = np.array([parameters.machine.gap_min, 0.0, 0.0, 0.0, 0.0])
+        nearest = np.array([parameters.machine.gap_min, 0.0, 0.0, 0.0, 0.0])
         self._asked = tuple(
             _Asked(
                 axis,
@@ -93,7 +93,7 @@ class Knock:
                 duration,
             )
             for axis in (X, Z)
-            if _thrust(self._machine, hover, np.zeros(4), axis)  # a single motor has none along z
+            if _thrust(self._machine, nearest, np.zeros(4), axis)  # a single motor has none along z
         )
 
     def look(self, watched: GuardArrays, flying: bool) -> int | None:
