@@ -17,7 +17,7 @@ import numpy as np
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import MeasurementFault, Regulator
 from maglev_model.axes import AXES, THETA, FloatArray, X, Y, Z
-from maglev_model.parameters import ParameterError, from_yaml, replace
+from maglev_model.parameters import ParameterError, from_yaml, replace, values
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
 from maglev_study.closed_loop import run
@@ -39,16 +39,16 @@ NO_COUNTS = {'encoder.gap_resolution': 0.0, 'encoder.horizontal_resolution': 0.0
 Values = Mapping[str, object]
 
 
-def on_all_axes(**values: object) -> dict[str, object]:
+def on_all_axes(**given: object) -> dict[str, object]:
     """Parameters of every axis, by full name."""
-    return {f'{axis}.{name}': value for axis in AXES for name, value in values.items()}
+    return {f'{axis}.{name}': value for axis in AXES for name, value in given.items()}
 
 
 def slower(factor: float) -> dict[str, object]:
     """All three numbers of every axis by a factor; margins are not what this is about."""
-    numbers = {'bandwidth': 200.0, 'integration': 90.0, 'learning': 10.0}
-    scaled = {name: factor * value for name, value in numbers.items()}
-    return {**on_all_axes(**scaled), 'margins.override': True}
+    names = [f'{axis}.{name}' for axis in AXES for name in ('bandwidth', 'integration', 'learning')]
+    given = values(ControllerParameters())
+    return {**{name: factor * given[name] for name in names}, 'margins.override': True}
 
 
 ROWS: tuple[tuple[str, Values, Values], ...] = (

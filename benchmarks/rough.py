@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from joblib import Parallel, delayed
 
 from maglev_model.axes import AXES, THETA, FloatArray, X, Y, Z
 from maglev_model.parameters import read_yaml, replace
@@ -81,10 +82,12 @@ def fly_many(count: int, hold: float, places: int, chosen: Sequence[str]) -> Non
         '| rms about the mean: median | worst | note |\n|:--|:--|--:|--:|--:|--:|--:|--:|:--|'
     )
     plants = list(machines(PARAMS, count))
+    workers = Parallel(n_jobs=-1)
     for experiment in experiments(PERIOD, hold=hold, places=places):
         for law, controller in laws(PARAMS, 'rough').items():
             if law in chosen:
-                found = [fly_rough(plant, controller, experiment) for plant in plants]
+                fly = delayed(fly_rough)
+                found = workers(fly(plant, controller, experiment) for plant in plants)
                 print(line_of_many(law, found), flush=True)
 
 

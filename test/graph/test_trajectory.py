@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from flight import WATCHED, samples
+from flight import WATCHED
 from graph import Nodes, Observer
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
@@ -20,6 +20,13 @@ def to_x(goal: float) -> JointTrajectory:
     return JointTrajectory(joint_names=['x'], points=[point])
 
 
+def settles(watching: Observer, axis: int, goal: float) -> None:
+    """Wait until half a second of stage time after the reference of an axis came to its goal."""
+    watching.wait(lambda: watching.newest(REFERENCE).position[axis] == pytest.approx(goal))
+    end = watching.newest(REFERENCE).sequence + 500
+    watching.wait(lambda: watching.newest(TRUE_STATE).sequence > end)
+
+
 def test_it_is_followed_from_the_hover_or_refused(nodes: Nodes, watching: Observer) -> None:
     nodes.start('plant', WATCHED, params=('benchmark.yaml',))
     nodes.start('controller', WATCHED)
@@ -31,8 +38,7 @@ def test_it_is_followed_from_the_hover_or_refused(nodes: Nodes, watching: Observ
     reference.wait_for('trajectory refused: unreachable reference: x is', timeout=60.0)
     publisher.publish(to_x(0.01))
     reference.wait_for('following a trajectory of 0.5 s, then hovering', timeout=60.0)
-    watching.wait(lambda: watching.newest(REFERENCE).position[1] == pytest.approx(0.01))
-    samples(watching, 500)
+    settles(watching, 1, 0.01)
     assert watching.newest(TRUE_STATE).state[2] == pytest.approx(0.01, abs=5e-5)
     client = watching.node.create_client(Step, 'reference/step')
     refused = watching.ask(client, Step.Request(axis='z', distance=0.055))
@@ -41,8 +47,7 @@ def test_it_is_followed_from_the_hover_or_refused(nodes: Nodes, watching: Observ
     taken = watching.ask(client, Step.Request(axis='y', distance=-0.001))
     assert taken.success
     assert taken.message == 'y steps in 0.2 s, then hovers'
-    watching.wait(lambda: watching.newest(REFERENCE).position[0] == pytest.approx(0.024))
-    samples(watching, 500)
+    settles(watching, 0, 0.024)
     assert watching.newest(TRUE_STATE).state[0] == pytest.approx(0.024, abs=5e-5)
     assert watching.newest(TRUE_STATE).state[2] == pytest.approx(0.01, abs=5e-5)
     assert watching.call('/reference/land').success

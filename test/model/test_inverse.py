@@ -105,10 +105,12 @@ def test_the_paper_leaves_a_fifth_of_the_vertical_force_out_at_20_mm() -> None:
 
 
 @settings(max_examples=200, deadline=None)
-@given(output=outputs, wanted=rough)
-def test_limits_hold_whatever_is_wanted(output: np.ndarray, wanted: np.ndarray) -> None:
+@given(output=outputs, wanted=rough, tilt=st.sampled_from([0.3, 0.5, 0.9]))
+def test_limits_hold_whatever_is_wanted(
+    output: np.ndarray, wanted: np.ndarray, tilt: float
+) -> None:
     """Phase amplitude within 7 A, and what is said to be realised is what the plant then does."""
-    answer = Answered(exact_inverse, PRIORITY, output, wanted)
+    answer = Answered(exact_inverse, PRIORITY._replace(tilt=tilt), output, wanted)
     amplitude = np.hypot(answer.direct, answer.quadrature)
     assert np.all(amplitude <= PRIORITY.current * (1.0 + 1e-9))
     np.testing.assert_allclose(answer.plant, answer.realised, rtol=1e-9, atol=1e-9)
@@ -198,6 +200,20 @@ def test_what_limits_is_told(axis: int, wanted: float, limited_by: int) -> None:
     w[axis] = wanted
     answer = Answered(exact_inverse, PRIORITY, np.array([0.025, 0.0, 0.0, 0.0, 0.0]), w)
     assert answer.limited_by == limited_by
+
+
+@pytest.mark.parametrize('axis', [3, 4])
+@pytest.mark.parametrize('tilt', [0.3, 0.5, 0.75, 0.9])
+def test_a_tilt_gets_its_share_of_the_attraction_and_no_more(axis: int, tilt: float) -> None:
+    hover = np.array([0.025, 0.0, 0.0, 0.0, 0.0])
+    most = tilt * MACHINE.M_y * MACHINE.G * MACHINE.r / MACHINE.I_x
+    for wanted in (0.99 * most, 1.2 * most):
+        w = np.zeros(5)
+        w[axis] = wanted
+        answer = Answered(exact_inverse, PRIORITY._replace(tilt=tilt), hover, w)
+        assert answer.limited_by == (0 if wanted < most else LEVITATION)
+        assert answer.plant[axis] == pytest.approx(min(wanted, most))
+        assert answer.plant[0] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_quadrature_current_yields_to_levitation_and_is_cut_by_the_current_without() -> None:

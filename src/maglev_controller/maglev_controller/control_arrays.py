@@ -50,6 +50,7 @@ SETTINGS: Final = np.dtype(
         ('current', 'f8'),  # CurrentLimits
         ('levitation_first', 'f8'),
         ('least_attraction', 'f8'),
+        ('tilt', 'f8'),
         ('jump_time', 'f8'),  # [s]
         ('jump_acceleration', 'f8', 5),
         ('feed_forward', 'f8'),  # 1, or 0

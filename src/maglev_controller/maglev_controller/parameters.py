@@ -12,7 +12,11 @@ from maglev_controller.design.notch import MOST
 from maglev_controller.design.state_space import Mode
 from maglev_controller.foreign_law import ForeignLawParameters
 from maglev_controller.learning_parameters import LearningParameters
-from maglev_model.loop_parameters import AxisLoopParameters, FundamentalParameters
+from maglev_model.loop_parameters import (
+    AxisLoopParameters,
+    FundamentalParameters,
+    HorizontalLoopParameters,
+)
 from maglev_model.machine import MachineParameters
 from maglev_model.parameters import ParameterError, group, parameter
 
@@ -55,6 +59,11 @@ class AxisParameters(AxisLoopParameters):
         'E of (17) [1/A], one for all internal-model states or one for each',
         within=(-1e3, 1e3),
     )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class HorizontalAxisParameters(HorizontalLoopParameters, AxisParameters):
+    """Internal model and gains of x or z."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -231,7 +240,7 @@ class FrictionParameters:
         within=(0.0, 1e3),
     )
     way: tuple[float, ...] = parameter(
-        (4e-6, 4e-6, 4e-6, 4e-6, 4e-6),
+        (3e-6, 3e-6, 3e-6, 3e-6, 3e-6),
         'way over which it turns after a reversal, per axis',
         unit='m, rad',
         within=(1e-8, 1.0),
@@ -311,6 +320,12 @@ class LimitParameters:
         0.1,
         'share of the weight carried however fast y shall fall (exact inverse)',
         within=(0.0, 0.9),
+    )
+    tilt: float = parameter(
+        0.5,
+        'share of the attraction by which two opposite motors may differ; above one half the other '
+        'two spare it (exact inverse, levitation first)',
+        within=(0.1, 0.9),
     )
 
 
@@ -406,8 +421,8 @@ class ControllerParameters:
     winding: WindingParameters = group(WindingParameters)
     learning: LearningParameters = group(LearningParameters)
     y: AxisParameters = group(AxisParameters)
-    x: AxisParameters = group(AxisParameters)
-    z: AxisParameters = group(AxisParameters)
+    x: HorizontalAxisParameters = group(HorizontalAxisParameters)
+    z: HorizontalAxisParameters = group(HorizontalAxisParameters)
     phi: AxisParameters = group(AxisParameters)
     theta: AxisParameters = group(AxisParameters)
     margins: MarginParameters = group(MarginParameters)

@@ -347,6 +347,7 @@ def _settings(
         'current': limits.current,
         'levitation_first': limits.levitation_first,
         'least_attraction': limits.least_attraction,
+        'tilt': limits.tilt,
         'jump_time': parameters.jumps.duration,
         'jump_acceleration': parameters.jumps.acceleration,
         'feed_forward': parameters.feed_forward,

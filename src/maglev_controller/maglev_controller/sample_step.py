@@ -184,7 +184,7 @@ def _currents(
 ) -> int:
     """The inverse of the settings, from w; what limited the currents."""
     limits = CurrentLimits(
-        settings.current, settings.levitation_first, settings.least_attraction, 0.5
+        settings.current, settings.levitation_first, settings.least_attraction, 0.5, settings.tilt
     )
     controlled, wanted = settings.controlled, sample.virtual_input
     answer = Answer(direct, quadrature, sample.realised, sample.excess)

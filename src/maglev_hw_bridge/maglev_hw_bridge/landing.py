@@ -111,7 +111,7 @@ def land(block: Block, position: FloatArray, rate: FloatArray, disturbance: Floa
             wanted[axis] = 0.0
     exact_inverse(
         machine_from_array(landing.machine),
-        CurrentLimits(landing.current_limit, 1.0, LEAST_ATTRACTION, landing.along_z),
+        CurrentLimits(landing.current_limit, 1.0, LEAST_ATTRACTION, landing.along_z, 0.5),
         np.ones(5),
         position,
         wanted,

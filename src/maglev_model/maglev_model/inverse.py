@@ -45,6 +45,7 @@ class CurrentLimits(NamedTuple):
     levitation_first: float  # 1: i_q yields to the i_d that carries the platen; 0: each by itself
     least_attraction: float  # share of the weight always carried, so that the tilts keep authority
     along_z: float = 0.5  # share of the attraction that motors 1 and 3 have where nothing else asks
+    tilt: float = 0.5  # share of the attraction by which two opposite motors may differ, at most
 
 
 class Answer(NamedTuple):
@@ -207,9 +208,9 @@ def exact_inverse(
     With P the attraction of a motor, (6) and (7) ask for ΣP = M_y (G − w_y), P_1 − P_3 and P_4 −
     P_2; the fourth condition is (8)'s, P_1 + P_3 = P_2 + P_4. By (2), P = (a − b i_d)² + b² i_q²,
     so i_d = (a − √(P − b² i_q²)) / b. Attraction cannot be negative: w_y is limited so that
-    ``least_attraction`` stays, and a tilt gets at most all of its pair. Since P ≥ b² i_q², a pair
-    that needs much i_q gets more than half of the attraction, and what that cannot serve limits
-    u_x and u_z. Of a machine with a single motor it is that motor that (2) is solved for.
+    ``least_attraction`` stays, and a tilt gets at most the share ``tilt`` of it. Since P ≥ b² i_q²,
+    a pair that needs much i_q, or turns the platen with more than half of the attraction, gets more
+    than half, and what that cannot serve limits u_x and u_z. Of a machine with a single motor it is that motor that (2) is solved for.
     """
     if machine.motors == 1.0:
         return _single_motor_inverse(machine, limits, controlled, output, wanted, answer)
@@ -272,8 +273,9 @@ def _allocate(
     inertia = machine.I_x / machine.r
     phi = controlled[3] * inertia * (wanted[3] + machine.k_s_phi * output[3])
     theta = controlled[4] * inertia * (wanted[4] + machine.k_s_theta * output[4])
-    saturated = saturated or abs(phi) > 0.5 * total or abs(theta) > 0.5 * total
-    phi, theta = clip(phi, 0.5 * total), clip(theta, 0.5 * total)
+    most = limits.tilt * total
+    saturated = saturated or abs(phi) > most or abs(theta) > most
+    phi, theta = clip(phi, most), clip(theta, most)
     along_z = limits.along_z * total
     if limits.levitation_first != 0.0:
         bound = limits.current
@@ -284,6 +286,7 @@ def _allocate(
         else:
             along_z = min(max(along_z, need_z), total - need_x)
     along_x = total - along_z
+    saturated = saturated or abs(phi) > along_z or abs(theta) > along_x
     phi, theta = clip(phi, along_z), clip(theta, along_x)
     attraction[0], attraction[2] = 0.5 * (along_z + phi), 0.5 * (along_z - phi)
     attraction[1], attraction[3] = 0.5 * (along_x - theta), 0.5 * (along_x + theta)

@@ -42,3 +42,18 @@ class AxisLoopParameters:
     learning: float = parameter(
         10.0, 'how fast the oscillators learn, m', unit='rad/s', within=(1e-3, 1e4)
     )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class HorizontalLoopParameters(AxisLoopParameters):
+    """Those of x and z, whose encoders pass more of their counts on than an axis of four gaps."""
+
+    bandwidth: float = parameter(
+        180.0, 'bandwidth of the feedback, W', unit='rad/s', within=(0.1, 1e4)
+    )
+    integration: float = parameter(
+        81.0, 'how fast the integrator learns, i', unit='rad/s', within=(1e-3, 1e4)
+    )
+    learning: float = parameter(
+        9.0, 'how fast the oscillators learn, m', unit='rad/s', within=(1e-3, 1e4)
+    )

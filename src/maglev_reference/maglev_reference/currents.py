@@ -12,6 +12,7 @@ import numpy.typing as npt
 from maglev_model.axes import AXES, PHI, FloatArray
 from maglev_model.currents import exact_currents
 from maglev_model.guide import GuideParameters
+from maglev_model.inverse import NO_LIMITS
 from maglev_model.machine import machine_constants
 from maglev_reference.check import UnreachableError
 from maglev_reference.motion import Kinematics
@@ -37,7 +38,8 @@ def motor_currents(
     machine = parameters.machine
     position = np.clip(samples.position, machine.lower_limit, machine.upper_limit)
     wanted = samples.acceleration + friction(samples.velocity, parameters.guide)
-    return exact_currents(machine_constants(machine), position, wanted)
+    limits = NO_LIMITS._replace(tilt=parameters.limits.tilt)
+    return exact_currents(machine_constants(machine), position, wanted, limits)
 
 
 def current_amplitudes(samples: Kinematics, parameters: ReferenceParameters) -> FloatArray:

@@ -6,7 +6,11 @@ import dataclasses
 
 from maglev_model.axes import AXES
 from maglev_model.guide import GuideParameters
-from maglev_model.loop_parameters import AxisLoopParameters, FundamentalParameters
+from maglev_model.loop_parameters import (
+    AxisLoopParameters,
+    FundamentalParameters,
+    HorizontalLoopParameters,
+)
 from maglev_model.machine import MachineParameters
 from maglev_model.parameters import ParameterError, group, parameter
 from maglev_reference.trajectory_parameters import (
@@ -91,6 +95,11 @@ class ReferenceLimits:
         'the rest is for feedback',
         unit='A',
         within=(0.1, 100.0),
+    )
+    tilt: float = parameter(
+        0.5,
+        "share of the attraction by which two opposite motors may differ, the law's limits.tilt",
+        within=(0.1, 0.9),
     )
     voltage: float = parameter(
         0.0, 'of a phase that a fastest move takes at most; 0: any', unit='V', within=(0.0, 1e4)
@@ -218,8 +227,8 @@ class ReferenceParameters:
     guide: GuideParameters = group(GuideParameters)
     internal_model: InternalModelParameters = group(InternalModelParameters)
     y: AxisLoopParameters = group(AxisLoopParameters)
-    x: AxisLoopParameters = group(AxisLoopParameters)
-    z: AxisLoopParameters = group(AxisLoopParameters)
+    x: HorizontalLoopParameters = group(HorizontalLoopParameters)
+    z: HorizontalLoopParameters = group(HorizontalLoopParameters)
     phi: AxisLoopParameters = group(AxisLoopParameters)
     theta: AxisLoopParameters = group(AxisLoopParameters)
 

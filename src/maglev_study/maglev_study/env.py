@@ -106,7 +106,9 @@ class StageEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._current = limits.current
         self._inverse = inverse_of(
             self._regulator.parameters,
-            CurrentLimits(limits.current, limits.levitation_first, limits.least_attraction, 0.5),
+            CurrentLimits(
+                limits.current, limits.levitation_first, limits.least_attraction, 0.5, limits.tilt
+            ),
         )
         self._duration, self._penalty, self._course = duration, penalty, course
         self._told = np.zeros((TOLD, 5))
