@@ -140,3 +140,24 @@ def test_a_sweep_flies_each_value_or_says_why_not() -> None:
         controller={'friction.adaptation_time': 0.0, 'y.bandwidth': 80.0},
     )
     assert slow.mean_error == alone.mean_error
+
+
+def test_a_batch_flies_machines_over_processes_as_one_by_one() -> None:
+    machines = [
+        {'offset.mass_y': 1.05},
+        {'offset.mass_y': -1.0},
+        maglev.build(maglev.PlantParameters, {'offset.K_h': 0.9}),
+    ]
+    given: dict[str, Any] = {'duration': 0.5, 'controller': {'y.bandwidth': 120.0}}
+    alone = maglev.batch(machines, 'ellipse', jobs=1, **given)
+    together = maglev.batch(machines, 'ellipse', jobs=2, **given)
+    assert repr(together) == repr(alone)
+    assert [each.value for each in together] == machines
+    heavy, refused, weak = together
+    assert "'offset.mass_y' is -1, it must lie in" in refused.reason
+    for each, machine in ((heavy, machines[0]), (weak, machines[2])):
+        assert each.reason == ''
+        flight = maglev.fly('ellipse', plant=machine, **given)
+        assert each.mean_error == flight.mean_error
+    with pytest.raises(TypeError, match="'plant' is what the machines are"):
+        maglev.batch(machines, plant={'seed': 1})

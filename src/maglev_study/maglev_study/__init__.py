@@ -1,8 +1,9 @@
 """The machine as a library: ``import maglev_study as maglev``. No ROS, and no part of a flight.
 
 ``simulate`` runs the plant under a function, ``fly`` a whole flight, ``sweep`` one for each value
-of a parameter; ``read`` gives the run in a bag, ``linearise`` and ``nonlinear_plant`` what
-python-control works on. See docs/library.md. What a name needs is imported when it is first used.
+of a parameter, ``batch`` one for each of many machines over the cores; ``read`` gives the run in a
+bag, ``linearise`` and ``nonlinear_plant`` what python-control works on. See docs/library.md. What a
+name needs is imported when it is first used.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from maglev_study.flight import FlightRecord as FlightRecord
     from maglev_study.flight import fly as fly
     from maglev_study.library import Swept as Swept
+    from maglev_study.library import batch as batch
     from maglev_study.library import simulate as simulate
     from maglev_study.library import sweep as sweep
     from maglev_study.linear import hover_currents as hover_currents
@@ -31,6 +33,7 @@ _MODULES = {
     'PlantParameters': 'maglev_plant.parameters',
     'ReferenceParameters': 'maglev_reference.parameters',
     'Swept': 'maglev_study.library',
+    'batch': 'maglev_study.library',
     'build': 'maglev_model.parameters',
     'fly': 'maglev_study.flight',
     'hover_currents': 'maglev_study.linear',

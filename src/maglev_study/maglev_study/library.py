@@ -1,10 +1,11 @@
-"""The plant under a function, and one flight for each value of a parameter."""
+"""The plant under a function; one flight for each value of a parameter, or for each machine."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterable, Mapping
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from maglev_plant.parameters import PlantParameters
 from maglev_study.arguments import a_table
 from maglev_study.closed_loop import LawFault
 from maglev_study.flight import FlightRecord, fly
+from maglev_study.robustness.workers import results
 
 NODES = ('plant', 'controller', 'reference')
 
@@ -49,7 +51,7 @@ def simulate(
 
 @dataclasses.dataclass(frozen=True)
 class Swept:
-    """One flight of a sweep: the parameter's ``value``, and how it went.
+    """One flight of a sweep or batch: the parameter's ``value``, or the machine, and how it went.
 
     ``mean_error`` and ``largest_error`` by axis over the measured samples [m, rad]; ``saturated``
     the share of all samples with a limited current. Where it did not fly, these are NaN and
@@ -69,14 +71,15 @@ def sweep(
     trajectory: str | None = None,
     *,
     duration: float | None = None,
+    jobs: int = 1,
     **given: Any,
 ) -> list[Swept]:
     """Fly once for each of ``values`` of a parameter, which is named with its node.
 
     ``sweep('controller.y.bandwidth', (100.0, 200.0), 'ellipse', duration=5.0)``; all else is given
-    as to :func:`~maglev_study.flight.fly`. A value that is refused, or with which the platen is
-    given up or the law fails, has its reason in the result. Raises ParameterError for a parameter
-    of no node.
+    as to :func:`~maglev_study.flight.fly`. In processes of their own with more than one of
+    ``jobs``. A value that is refused, or with which the platen is given up or the law fails, has
+    its reason in the result. Raises ParameterError for a parameter of no node.
     """
     node, dot, name = parameter.partition('.')
     if node not in NODES or not dot:
@@ -87,15 +90,45 @@ def sweep(
     shared = given.pop(node, None) or {}
     if not isinstance(shared, Mapping):
         raise TypeError(f"'{node}' is swept over, so it takes a dict of parameters by name")
-    found = []
-    for value in values:
-        mine: Any = {**given, node: {**shared, name: value}}
-        try:
-            found.append(_swept(value, fly(trajectory, duration=duration, **mine)))
-        except (ParameterError, MeasurementFault, LawFault) as error:
-            nothing = dict.fromkeys(AXES, math.nan)
-            found.append(Swept(value, nothing, dict(nothing), math.nan, str(error)))
-    return found
+    given |= {'trajectory': trajectory, 'duration': duration}
+    return _fly_each([(value, {**given, node: {**shared, name: value}}) for value in values], jobs)
+
+
+def batch(
+    machines: Iterable[PlantParameters | Mapping[str, object]],
+    trajectory: str | None = None,
+    *,
+    duration: float | None = None,
+    jobs: int | None = None,
+    **given: Any,
+) -> list[Swept]:
+    """Fly each of many machines once, over the cores; in their order, how it went.
+
+    ``batch([{'offset.mass_y': 1.05}, {'offset.K_h': 0.95}], 'ellipse', duration=5.0)``; a machine
+    is what :func:`~maglev_study.flight.fly` takes for ``plant``, and all else is given as to it.
+    ``jobs`` processes, by default one for each core; equal calls give equal results, bit for bit,
+    however many. A machine that is refused, or given up, or on which the law fails, has its reason
+    in the result. Raises TypeError for what is no machine.
+    """
+    if 'plant' in given:
+        raise TypeError("'plant' is what the machines are")
+    given |= {'trajectory': trajectory, 'duration': duration}
+    wanted = [(machine, {**given, 'plant': machine}) for machine in machines]
+    return _fly_each(wanted, jobs or os.cpu_count() or 1)
+
+
+def _fly_each(wanted: Sequence[tuple[Any, Mapping[str, Any]]], jobs: int) -> list[Swept]:
+    tasks = [(place, value, given) for place, (value, given) in enumerate(wanted)]
+    found = dict(results(_fly_one, tasks, jobs=jobs))
+    return [found[place] for place in range(len(tasks))]
+
+
+def _fly_one(place: int, value: Any, given: Mapping[str, Any]) -> tuple[int, Swept]:
+    try:
+        return place, _swept(value, fly(**given))
+    except (ParameterError, MeasurementFault, LawFault) as error:
+        nothing = dict.fromkeys(AXES, math.nan)
+        return place, Swept(value, nothing, dict(nothing), math.nan, str(error))
 
 
 def _swept(value: Any, flight: FlightRecord) -> Swept:

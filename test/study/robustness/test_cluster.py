@@ -19,9 +19,7 @@ from maglev_study.robustness import fleet
 from maglev_study.robustness.fleet import Campaign, Plan, fly_plan, make_plan
 from maglev_study.robustness.fly import Flown
 
-distributed = pytest.importorskip(
-    'distributed', reason='needs distributed (Dask), which set-up does not install'
-)
+distributed = pytest.importorskip('distributed', reason='distributed comes with the test tools')
 
 PARAMS = Path(__file__).resolve().parents[3] / 'params'
 EXPERIMENTS = ('step_y', 'step_x', 'scan')
