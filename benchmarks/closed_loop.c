@@ -236,14 +236,15 @@ static void currents(Settings *c, Machine *m, Sample *p, double *direct, double 
   double wanted = m->M_y * (m->G - w[0]), least = c->least_attraction * m->M_y * m->G;
   double phi = m->I_x / m->r * (w[3] + m->k_s_phi * x[3]);
   double theta = m->I_x / m->r * (w[4] + m->k_s_theta * x[4]);
-  double total = fmax(wanted, least), half = 0.5 * total;
-  int limited = wanted < least || fabs(phi) > half || fabs(theta) > half;
-  phi = within(phi, half), theta = within(theta, half);
+  double total = fmax(wanted, least), most = c->tilt * total;
+  int limited = wanted < least || fabs(phi) > most || fabs(theta) > most;
+  phi = within(phi, most), theta = within(theta, most);
   double need_z = pair_need(within(u_z, c->current), b[0], b[2], phi, 0.25 * least);
   double need_x = pair_need(within(u_x, c->current), b[1], b[3], -theta, 0.25 * least);
   double along_z = need_x + need_z > total ? total * need_z / (need_x + need_z)
-                                           : fmin(fmax(half, need_z), total - need_x);
+                                           : fmin(fmax(0.5 * total, need_z), total - need_x);
   double along_x = total - along_z;
+  limited |= fabs(phi) > along_z || fabs(theta) > along_x;
   phi = within(phi, along_z), theta = within(theta, along_x);
   pull[0] = 0.5 * (along_z + phi), pull[2] = 0.5 * (along_z - phi);
   pull[1] = 0.5 * (along_x - theta), pull[3] = 0.5 * (along_x + theta);

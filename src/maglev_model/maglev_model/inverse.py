@@ -210,7 +210,8 @@ def exact_inverse(
     so i_d = (a − √(P − b² i_q²)) / b. Attraction cannot be negative: w_y is limited so that
     ``least_attraction`` stays, and a tilt gets at most the share ``tilt`` of it. Since P ≥ b² i_q²,
     a pair that needs much i_q, or turns the platen with more than half of the attraction, gets more
-    than half, and what that cannot serve limits u_x and u_z. Of a machine with a single motor it is that motor that (2) is solved for.
+    than half, and what that cannot serve limits u_x and u_z. Of a machine with a single motor it is
+    that motor that (2) is solved for.
     """
     if machine.motors == 1.0:
         return _single_motor_inverse(machine, limits, controlled, output, wanted, answer)

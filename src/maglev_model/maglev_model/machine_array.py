@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Annotated, Final
 
 import numpy as np
-from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
-from maglev_model.compiled import compiled
+from maglev_model.compiled import compiled, to_fixed_tuple
 from maglev_model.machine import Machine
 
 FIELDS: Final = len(Machine._fields)
