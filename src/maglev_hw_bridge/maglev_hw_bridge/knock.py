@@ -4,8 +4,8 @@ At small gaps the motors are commutated so that they pull less than they would w
 push a platen that is not where x or z says along, the harder the farther it is off: a stuck encoder
 ends in a run to a stop. Neither gaps nor model can tell in time, for friction may as well hold the
 platen. So one that seems to stand still is pushed, for some milliseconds to and fro, by what moves
-it one count in spite of the friction that there may be. Where nothing is counted then, it is pushed
-once more, twice as hard.
+it one count in spite of the friction that there may be; before that, more softly, for there may be
+less. Where nothing is counted then, it is pushed once more, twice as hard.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from maglev_model.platen import output_accelerations
 _PUSH = 8e-3  # in either direction [s]
 _COUNTS = 1.2  # by which the platen moves in it at least
 _LATE = 4  # samples in which a count may still come
-_HARDEST = 2  # times as hard, the second time
+_HARDEST = 2.0  # times as hard, the last time
+_SOFTEST, _SOFTENING = 0.3, 0.9  # of the push, the first time; of what was enough, the next time
 
 
 @compiled
@@ -36,19 +37,23 @@ def _thrust(machine: Machine, position: FloatArray, i_d: FloatArray, axis: int) 
 
 
 class _Asked:
-    """Knocks at x or at z."""
+    """Knocks at x or at z: as hard as mostly was enough, then as hard as must be, then harder."""
 
     def __init__(self, axis: int, acceleration: float, duration: int) -> None:
         self.axis = axis
         self._acceleration, self._duration = acceleration, duration  # [m/s²], [samples]
         self.under_way = False
         self._samples = self._turn = 0  # of it, and after which the push turns round
-        self._hardness, self._sign, self._answered = 1, 1.0, False
+        self._sign, self._answered = 1.0, False
+        self._enough = self._hardness = _SOFTEST
 
-    def begin(self, sign: float, hardness: int = 1) -> None:
+    def begin(self, sign: float) -> None:
+        self._sign = sign
+        self._push(self._enough)
+
+    def _push(self, hardness: float) -> None:
         self.under_way, self._answered = True, False
-        self._samples, self._turn = 0, self._duration
-        self._sign, self._hardness = sign, hardness
+        self._samples, self._turn, self._hardness = 0, self._duration, hardness
 
     def go_on(self, counted: bool) -> bool:
         """One sample later; whether the platen must have moved and was not seen to."""
@@ -59,11 +64,17 @@ class _Asked:
             return False
         self.under_way = False
         if self._answered:
+            if self._hardness == self._enough:
+                self._enough = max(_SOFTENING * self._enough, _SOFTEST)
             return False
-        if self._hardness < _HARDEST:
-            self.begin(self._sign, _HARDEST)
-            return False
-        return True
+        if self._hardness < 1.0:
+            self._enough = min(self._enough / _SOFTENING**2, 1.0)
+            self._push(1.0)
+        elif self._hardness < _HARDEST:
+            self._push(_HARDEST)
+        else:
+            return True
+        return False
 
     @property
     def acceleration(self) -> float:
@@ -84,6 +95,8 @@ class Knock:
         self._limit = fault.command_limit
         self._machine = machine_constants(parameters.machine)
         self._i_q = np.zeros(4)
+        self._seen = np.zeros(2)  # of x and z [m]
+        self._passed = np.zeros(2)  # which way the last edge was: it is nearest going back
         count = parameters.encoder.resolution
         nearest = np.array([parameters.machine.gap_min, 0.0, 0.0, 0.0, 0.0])
         self._asked = tuple(
@@ -98,6 +111,9 @@ class Knock:
 
     def look(self, watched: GuardArrays, flying: bool) -> int | None:
         """One sample; the encoder, 4 or 5, that does not count. Ends with the flight."""
+        change = watched.believed[4:] - self._seen
+        self._seen[:] = watched.believed[4:]
+        np.copyto(self._passed, np.sign(change), where=change != 0.0)
         for asked in self._asked:
             asked.under_way = asked.under_way and flying
             silent = watched.silent[asked.axis - X]
@@ -105,9 +121,13 @@ class Knock:
                 if asked.go_on(silent == 0):
                     return 3 + asked.axis
             elif 0 < self._patience <= silent:
-                push = watched.acceleration[asked.axis] - watched.disturbance[asked.axis]
-                asked.begin(-1.0 if push < 0.0 else 1.0)
+                asked.begin(-self._passed[asked.axis - X] or self._leaning(watched, asked.axis))
         return None
+
+    @staticmethod
+    def _leaning(watched: GuardArrays, axis: int) -> float:
+        """Which way the currents and what disturbs it push an axis."""
+        return -1.0 if watched.acceleration[axis] < watched.disturbance[axis] else 1.0
 
     def added(self, watched: GuardArrays, i_d: FloatArray, i_q: FloatArray) -> FloatArray:
         """``i_q`` (4,) [A] with what knocks: none while the motors have nothing left for it."""
