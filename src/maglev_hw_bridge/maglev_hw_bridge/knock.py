@@ -46,6 +46,13 @@ class _Asked:
         self._samples = self._turn = 0  # of it, and after which the push turns round
         self._sign, self._answered = 1.0, False
         self._enough = self._hardness = _SOFTEST
+        self._reading = 0.0  # [m]
+        self.passed = 0.0  # which way the last edge was: it is nearest going back
+
+    def follow(self, reading: float) -> None:
+        if reading != self._reading:
+            self.passed = 1.0 if reading > self._reading else -1.0
+            self._reading = reading
 
     def begin(self, sign: float) -> None:
         self._sign = sign
@@ -95,8 +102,6 @@ class Knock:
         self._limit = fault.command_limit
         self._machine = machine_constants(parameters.machine)
         self._i_q = np.zeros(4)
-        self._seen = np.zeros(2)  # of x and z [m]
-        self._passed = np.zeros(2)  # which way the last edge was: it is nearest going back
         count = parameters.encoder.resolution
         nearest = np.array([parameters.machine.gap_min, 0.0, 0.0, 0.0, 0.0])
         self._asked = tuple(
@@ -111,17 +116,15 @@ class Knock:
 
     def look(self, watched: GuardArrays, flying: bool) -> int | None:
         """One sample; the encoder, 4 or 5, that does not count. Ends with the flight."""
-        change = watched.believed[4:] - self._seen
-        self._seen[:] = watched.believed[4:]
-        np.copyto(self._passed, np.sign(change), where=change != 0.0)
         for asked in self._asked:
+            asked.follow(watched.believed[3 + asked.axis])
             asked.under_way = asked.under_way and flying
             silent = watched.silent[asked.axis - X]
             if asked.under_way:
                 if asked.go_on(silent == 0):
                     return 3 + asked.axis
             elif 0 < self._patience <= silent:
-                asked.begin(-self._passed[asked.axis - X] or self._leaning(watched, asked.axis))
+                asked.begin(-asked.passed or self._leaning(watched, asked.axis))
         return None
 
     @staticmethod
