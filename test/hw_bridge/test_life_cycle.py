@@ -285,6 +285,32 @@ def test_a_second_fault_after_every_recovery(recover: str) -> None:
         flight.regulator.reset()
 
 
+@pytest.mark.parametrize('first', ['stop', 'encoder', 'lost'])
+def test_a_stop_while_a_fault_is_latched_outlasts_the_reset_that_was_under_way(first: str) -> None:
+    flight = Flight(hover(0.025))
+    flight.run(150)
+    if first == 'stop':
+        flight.stage.stop()
+    elif first == 'encoder':
+        flight.boards.jumps[4] = 300
+    else:
+        flight.boards.expire()
+    flight.run(1)
+    if first != 'lost':
+        flight.until_no_current()
+    flight.rig.place(np.array([LOWER_STOP, 0.0, 0.0, 0.0, 0.0]))
+    flight.boards.jumps[:] = 0
+    latched, mode = flight.stage.fault, flight.stage.mode
+    assert latched is not None
+    flight.stage.stop('by the other one')
+    refused, why = flight.stage.reset()
+    assert not refused
+    assert 'by the other one' in why
+    assert flight.stage.fault == latched
+    assert flight.stage.mode is mode
+    assert 'by the other one' not in flight.stage.reset()[1]
+
+
 @pytest.mark.parametrize('stage_kind', ['lower', 'upper', 'held'])
 def test_homing_tells_the_stops_apart(stage_kind: str) -> None:
     stage, boards = bridge(homing__at_start=False)

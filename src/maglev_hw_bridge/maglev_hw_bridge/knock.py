@@ -3,9 +3,9 @@
 At small gaps the motors are commutated so that they pull less than they would without current, and
 push a platen that is not where x or z says along, the harder the farther it is off: a stuck encoder
 ends in a run to a stop. Neither gaps nor model can tell in time, for friction may as well hold the
-platen. So one that seems to stand still is pushed, for some milliseconds to and fro, by what moves
-it one count in spite of the friction that there may be; before that, more softly, for there may be
-less. Where nothing is counted then, it is pushed once more, twice as hard.
+platen. So one that seems to stand still is knocked, pushed for some milliseconds to and fro, softly
+first, for there may be little friction, then ever harder. What moves it one count in spite of the
+friction that there may be, and is doubled, comes last: where nothing is counted then, it is lost.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from maglev_model.compiled import compiled
 from maglev_model.machine import Machine, machine_constants
 from maglev_model.platen import output_accelerations
 
-_PUSH = 8e-3  # in either direction [s]
-_COUNTS = 1.2  # by which the platen moves in it at least
+_PUSH = 4e-3  # in either direction [s]
+_KNOCKS, _GROWTH = 7, 1.5  # at the most; how much harder each is than the one before
+_COUNTS = 1.2  # by which the platen is moved at least, by half of the hardest
+_HARDEST = 2.0
 _LATE = 4  # samples in which a count may still come
-_HARDEST = 2.0  # times as hard, the last time
-_SOFTEST, _SOFTENING = 0.3, 0.9  # of the push, the first time; of what was enough, the next time
 
 
 @compiled
@@ -37,15 +37,16 @@ def _thrust(machine: Machine, position: FloatArray, i_d: FloatArray, axis: int) 
 
 
 class _Asked:
-    """Knocks at x or at z: as hard as mostly was enough, then as hard as must be, then harder."""
+    """Knocks at x or at z, each harder than the one before."""
 
-    def __init__(self, axis: int, acceleration: float, duration: int) -> None:
+    def __init__(self, axis: int, hardest: float, duration: int) -> None:
+        """``hardest`` push [m/s²], in samples ``duration``."""
         self.axis = axis
-        self._acceleration, self._duration = acceleration, duration  # [m/s²], [samples]
-        self.under_way = False
-        self._samples = self._turn = 0  # of it, and after which the push turns round
-        self._sign, self._answered = 1.0, False
-        self._enough = self._hardness = _SOFTEST
+        self._softest, self._duration = hardest / _GROWTH ** (_KNOCKS - 1), duration
+        self.under_way = self._answered = False
+        self._knocks = self._samples = 0  # so far, of this asking and of this knock
+        self._turn = duration  # samples after which it is pushed back, for as long
+        self._push = 0.0  # signed [m/s²]
         self._reading = 0.0  # [m]
         self.passed = 0.0  # which way the last edge was: it is nearest going back
 
@@ -55,41 +56,34 @@ class _Asked:
             self._reading = reading
 
     def begin(self, sign: float) -> None:
-        self._sign = sign
-        self._push(self._enough)
-
-    def _push(self, hardness: float) -> None:
         self.under_way, self._answered = True, False
-        self._samples, self._turn, self._hardness = 0, self._duration, hardness
+        self._knocks = 0
+        self._knock(sign * self._softest)
+
+    def _knock(self, push: float) -> None:
+        self._samples, self._turn, self._push = 0, self._duration, push
+        self._knocks += 1
 
     def go_on(self, counted: bool) -> bool:
         """One sample later; whether the platen must have moved and was not seen to."""
         self._samples += 1
         if counted and not self._answered:
             self._answered, self._turn = True, min(self._turn, self._samples)
-        if self._samples < 2 * self._turn + (0 if self._answered else _LATE):
+        last = self._knocks == _KNOCKS
+        if self._samples < 2 * self._turn + (_LATE if last and not self._answered else 0):
             return False
-        self.under_way = False
-        if self._answered:
-            if self._hardness == self._enough:
-                self._enough = max(_SOFTENING * self._enough, _SOFTEST)
-            return False
-        if self._hardness < 1.0:
-            self._enough = min(self._enough / _SOFTENING**2, 1.0)
-            self._push(1.0)
-        elif self._hardness < _HARDEST:
-            self._push(_HARDEST)
-        else:
-            return True
+        if self._answered or last:
+            self.under_way = False
+            return not self._answered
+        self._knock(_GROWTH * self._push)
         return False
 
     @property
     def acceleration(self) -> float:
         """To push with [m/s²]."""
-        push = self._sign * self._hardness * self._acceleration
         if self._samples < self._turn:
-            return push
-        return -push if self._samples < 2 * self._turn else 0.0
+            return self._push
+        return -self._push if self._samples < 2 * self._turn else 0.0
 
 
 class Knock:
@@ -102,12 +96,12 @@ class Knock:
         self._limit = fault.command_limit
         self._machine = machine_constants(parameters.machine)
         self._i_q = np.zeros(4)
-        count = parameters.encoder.resolution
+        count, push = parameters.encoder.resolution, duration * period
         nearest = np.array([parameters.machine.gap_min, 0.0, 0.0, 0.0, 0.0])
         self._asked = tuple(
             _Asked(
                 axis,
-                fault.friction[axis] + 2.0 * _COUNTS * count[3 + axis] / (duration * period) ** 2,
+                _HARDEST * (fault.friction[axis] + 2.0 * _COUNTS * count[3 + axis] / push**2),
                 duration,
             )
             for axis in (X, Z)

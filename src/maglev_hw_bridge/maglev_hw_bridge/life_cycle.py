@@ -39,6 +39,7 @@ class StageLife(abc.ABC):
         self.realtime = realtime
         self.mode = Mode.CLOSED
         self.fault: Fault | None = None
+        self._stopped_since = ''  # why, while a fault was latched
         self.why = ''
         self.flying = False  # current flows
         try:
@@ -287,6 +288,9 @@ class StageLife(abc.ABC):
             return False, 'still landing: reset when the platen rests'
         if self.fault is None and self.mode is not Mode.DISABLED:
             return False, 'there is no fault'
+        if self._stopped_since:
+            why, self._stopped_since = self._stopped_since, ''
+            return False, f'stopped since the fault: {why}; see to that, and reset again'
         remaining = self._restart() if self.mode is Mode.LOST else self._remaining()
         if remaining:
             return False, f'the cause is still there: {remaining}'

@@ -229,7 +229,12 @@ class BridgeStage(StageLife):
             self._begin_landing()
 
     def stop(self, why: str = 'emergency stop', kind: str = 'stop', remedy: str = '') -> None:
-        """Latch a fault with that reason; lands while everything needed for that is sound."""
+        """Latch a fault with that reason; lands while everything needed for that is sound.
+
+        Where one is latched already, the next reset is refused: who asks for it may not know.
+        """
+        if kind == 'stop' and self.fault is not None:
+            self._stopped_since = why
         self._raise_fault(kind, why, remedy or 'see to what made it necessary')
 
     def _raise_fault(self, kind: str, reason: str, remedy: str, cut: bool = False) -> None:
