@@ -35,12 +35,14 @@ _CAMPAIGN = ('test/study/faults/test_campaign.py', 'test/study/faults/test_judge
 _BRIDGE = (
     *(f'test/hw_bridge/test_{name}.py' for name in ('driver_calls', 'encoders', 'amplifiers')),
     *(f'test/hw_bridge/test_{name}.py' for name in ('landing', 'faults', 'controllers')),
+    *(f'test/hw_bridge/test_{name}.py' for name in ('guard', 'knock', 'unseen', 'resting')),
     *(f'test/hw_bridge/test_{name}.py' for name in ('life_cycle', 'sensing', 'commission')),
     *_CAMPAIGN,
 )
 LOOKED_AT_BY: dict[str, tuple[str, ...]] = {
     'maglev_hw_bridge.guard': _BRIDGE,
     'maglev_hw_bridge.observer': _BRIDGE,
+    'maglev_hw_bridge.knock': _BRIDGE,
     'maglev_hw_bridge.landing': _BRIDGE,
     'maglev_hw_bridge.stage': _BRIDGE,
     'maglev_hw_bridge.life_cycle': _BRIDGE,
