@@ -63,7 +63,7 @@ def commission(claimed: dict[str, object]) -> tuple[list[str], EmulatedBoards]:
 def test_a_machine_that_is_right() -> None:
     told, boards = commission({})
     assert 'as the parameters say' in ''.join(told)
-    assert 'rose 0.49' in told[-1] or 'rose 0.50' in told[-1]
+    assert any(f'rose 0.{height}' in told[-1] for height in (49, 50, 51))
     assert boards.rig.state[0] == 0.031
     assert boards.rig.impact < 0.05
 

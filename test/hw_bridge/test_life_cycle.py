@@ -337,6 +337,32 @@ def test_homing_tells_the_stops_apart(stage_kind: str) -> None:
     stage.close()
 
 
+@pytest.mark.parametrize('magnets', [1.0, 1.1])
+@pytest.mark.parametrize('seen', [(), (3,), (4, 5)])
+def test_homing_with_encoders_that_are_not_plugged_in_throws_nothing_up(
+    seen: tuple[int, ...], magnets: float
+) -> None:
+    """``magnets`` is how much stronger they are than believed."""
+    offset = {f'emulation__offset__{name}': magnets for name in ('K_v1', 'K_v2', 'K_v3')}
+    stage, boards = bridge(homing__at_start=False, **offset)
+    boards.rig.place(np.array([LOWER_STOP, 0.0, 0.0, 0.0, 0.0]))
+    boards.stuck[:] = [encoder not in seen for encoder in range(6)]
+    stage.configure()
+    highest = LOWER_STOP
+
+    def watch(tick=boards.tick) -> None:
+        nonlocal highest
+        tick()
+        highest = min(highest, float(boards.rig.state[0]))
+
+    boards.tick = watch
+    with pytest.raises(HomingError):
+        stage.home()
+    assert boards.rig.impact < 0.1
+    assert LOWER_STOP - highest < 2e-3
+    stage.close()
+
+
 def test_homing_by_word_only() -> None:
     stage, boards = bridge(homing__at_start=False, homing__lift=0.0)
     stage.configure()

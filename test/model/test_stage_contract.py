@@ -209,6 +209,10 @@ def test_stopped_it_comes_down_and_keeps_the_first_reason(stage: Stage) -> None:
     come_to_rest(stage)
     stage.land('asked to')
     assert not lifts(stage)
+    refused, why = stage.reset()
+    assert not refused
+    assert 'something else' in why
+    assert stage.fault is fault
     assert stage.reset() == (True, 'cleared: emergency stop')
     assert lifts(stage)
     stage.stop('for a reason')

@@ -42,7 +42,7 @@ LOST: Final = 2
 
 _RESIDUAL_SAMPLES = 2
 _PROBATION = 20  # samples after a slip in which noise would leap again
-_SETTLING = 100  # samples in which the disturbance is found
+_BEGUN, _SETTLING = 2, 100  # samples for position and rate, until the disturbance is found
 _DOUBT = 2.5e-5  # an encoder that should have moved this far is not followed [m]
 _CERTAIN = 1.5  # as many times max_unseen it is stuck whatever the others read
 _DOUBTFUL_RESIDUAL = 6e-5  # [m]
@@ -329,7 +329,7 @@ def watch(block: Block, length: FloatArray, current: FloatArray, flying: bool) -
         g.blamed[i] = 0
         g.believed[i] = length[i] - g.offset[i]
     code, index = FINE, 0
-    if g.samples < 2:
+    if g.samples < _BEGUN:
         _begin(g)
     else:
         code = _judge(g, current, flying)
@@ -377,6 +377,10 @@ class Guard:
         g.samples = g.contradictions = 0
         g.unseen[:] = g.rate[:] = 0.0
         g.silent[:] = 0
+
+    def settle(self) -> None:
+        """Find the disturbance anew: no encoder is judged to be stuck for the next samples."""
+        self.arrays.samples = min(self.arrays.samples, _BEGUN)
 
     def trust(self) -> None:
         """Believe every encoder again: they have just been homed."""

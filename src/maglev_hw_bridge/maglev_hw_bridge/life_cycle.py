@@ -24,7 +24,7 @@ from maglev_hw_bridge.lift import Lift
 from maglev_hw_bridge.memory import Memory
 from maglev_hw_bridge.mode import Mode
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_model.stage import EncoderSample, Fault, StageError
+from maglev_model.stage import STOPPED_SINCE, EncoderSample, Fault, StageError
 
 FloatArray = NDArray[np.float64]
 
@@ -166,9 +166,9 @@ class StageLife(abc.ABC):
         if not lift.fine:
             raise HomingError(
                 f'lifted by {height * 1e3:.2f} mm, the platen rose {lift.risen * 1e3:.2f} mm and '
-                f'tilted {lift.tilt * 1e3:.2f} mrad{because}. It hangs on its upper stop, or '
-                'something holds it: put it on the lower one; a machine that was never '
-                'commissioned, commission first'
+                f'tilted {lift.tilt * 1e3:.2f} mrad{because}. It hangs on its upper stop, '
+                'something holds it, or encoders do not count: put it on the lower one, check '
+                'the plugs; a machine that was never commissioned, commission first'
             )
 
     def _peek(self, counts: NDArray[np.int32]) -> None:
@@ -290,7 +290,7 @@ class StageLife(abc.ABC):
             return False, 'there is no fault'
         if self._stopped_since:
             why, self._stopped_since = self._stopped_since, ''
-            return False, f'stopped since the fault: {why}; see to that, and reset again'
+            return False, STOPPED_SINCE.format(why)
         remaining = self._restart() if self.mode is Mode.LOST else self._remaining()
         if remaining:
             return False, f'the cause is still there: {remaining}'

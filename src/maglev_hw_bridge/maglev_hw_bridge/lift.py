@@ -1,9 +1,10 @@
 """A small lift-off under supervision: up from the stop, a moment in the air, and down again.
 
-First a push that grows, quickly, until the encoders show that the platen rises: that makes up for
-friction and for what the machine differs in from the model. On the upper stop the same currents
-press the platen against it, and nothing moves however much no machine within 10 % of the model
-could rest under: that is how the two stops are told apart.
+First short pushes, each harder than the one before, until the encoders show that the platen rises:
+that makes up for friction and for what the machine differs in from the model. On the upper stop the
+same currents press the platen against it, and nothing moves however much no machine within 10 % of
+the model could rest under: that is how the two stops are told apart. Nothing moves for encoders
+that are not plugged in either, so no push is longer than what the platen falls back from.
 """
 
 from __future__ import annotations
@@ -22,10 +23,11 @@ from maglev_model.machine import machine_constants
 
 _RISE, _HOVER = 0.5, 0.5  # [s]
 _INTEGRAL = 128_000.0  # acceleration per error of y and time [1/s³]
-_PUSHES = 95  # samples of the growing push, in which no encoder is judged to be stuck
-_GROWTH = 0.1  # of the push, a sample [m/s²]
+_PUSHES = 23
+_PAUSE, _PUSH = 0.09, 0.004  # before and of each [s]; no encoder is judged to be stuck in them
+_GROWTH = 100.0  # of the push while it lasts [m/s³]
 _NO_PUSH = 2.0  # about what the platen weighs more than its magnets carry there [m/s²]
-_MOST_PUSH = -6.0  # a platen 10 % heavier, with magnets 10 % weaker, rises at about -4.5 [m/s²]
+_MOST_PUSH = -7.0  # a platen 10 % heavier, with magnets 10 % weaker, rises at about -4.5 [m/s²]
 _MOVED = 1.5e-5  # what has risen by this has left its stop [m]
 
 TILT = 5e-4
@@ -69,15 +71,10 @@ class Lift:
         stage.hold()
         rest = float(np.mean(stage.read().gap))
         target = watched.position.copy()
-        start, risen, push = target[0], 0.0, _NO_PUSH
+        start = target[0]
         target[3:] = 0.0
-        for _ in range(_PUSHES):
-            push = max(push - _GROWTH, _MOST_PUSH)
-            target[0] = watched.position[0]
-            risen = rest - self._sample(stage, target, push)
-            if risen >= _MOVED or stage.mode is not Mode.FOLLOWING:
-                break
-        if risen < _MOVED and stage.mode is Mode.FOLLOWING:
+        push = self._push(stage, target, rest)
+        if push is None:
             return  # it still rests, whatever on, and what called ends the current
         heights = []
         for n in range(round((_RISE + _HOVER) / self._period)):
@@ -95,6 +92,21 @@ class Lift:
             stage.hold()
             stage.read()
         self.risen = float(np.mean(heights)) if heights else 0.0
+
+    def _push(self, stage: Any, target: FloatArray, rest: float) -> float | None:
+        """The push under which it rose from ``rest`` [m/s²]; None when it did not."""
+        watched, push = stage.guard.arrays, _NO_PUSH
+        pause, length = round(_PAUSE / self._period), max(round(_PUSH / self._period), 1)
+        for _ in range(_PUSHES):
+            for n in range(pause + length):
+                stage.guard.settle()
+                if n >= pause:
+                    push = max(push - _GROWTH * self._period, _MOST_PUSH)
+                target[0] = watched.position[0]
+                risen = rest - self._sample(stage, target, push if n >= pause else _NO_PUSH)
+                if risen >= _MOVED or stage.mode is not Mode.FOLLOWING:
+                    return push
+        return None
 
     def _sample(self, stage: Any, target: FloatArray, push: float) -> float:
         """One sample towards ``target`` (5,) with a push [m/s²]; the mean gap after it [m]."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from maglev_hw_bridge import amplifiers, faults, guard
 from maglev_hw_bridge.drivers import Driver, DriverError, Truthful
 from maglev_hw_bridge.knock import Knock
-from maglev_hw_bridge.landing import Landing
+from maglev_hw_bridge.landing import Landing, impacts_of_cut
 from maglev_hw_bridge.life_cycle import StageLife
 from maglev_hw_bridge.mode import Mode as Mode
 from maglev_hw_bridge.parameters import BridgeParameters
@@ -26,6 +26,7 @@ FloatArray = NDArray[np.float64]
 _ON_THE_STOP, _AT_REST = 1e-5, 3e-3  # nearer the lower stop and slower it rests [m], [m/s]
 _NEAR, _STILL, _REST_TIME = 2e-4, 1e-5, 0.1  # so it does where it moves no more there [m, m, s]
 _CORNERS = np.array([[-1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, -1.0]])  # (5): gaps by phi, theta
+_SOFT = 0.05  # a degraded landing's speed at the stop [m/s]
 _LEFT, _SOON = 3e-4, 0.02  # what rested and is, or soon will be, farther has left it [m], [s]
 
 
@@ -251,12 +252,18 @@ class BridgeStage(StageLife):
             self._begin_landing()
 
     def _begin_landing(self) -> None:
-        state = self.guard.arrays
-        if not self.flying or self._on_the_stop():
+        state, blind = self.guard.arrays, self.guard.blind
+        if not self.flying or self._on_the_stop() or (blind[3:].any() and self._falls_softly()):
             self._disable()
             return
         self.mode, self._landing_samples = Mode.LANDING, 0
-        self.landing.begin(state.position, state.rate, self.guard.blind)
+        self.landing.begin(state.position, state.rate, blind)
+
+    def _falls_softly(self) -> bool:
+        """Whether it is so near the lower stop that no landing by half of the gaps is softer."""
+        state = self.guard.arrays
+        impacts = impacts_of_cut(self.parameters, state.position[0], state.rate[0])
+        return set(impacts) == {'lower'} and impacts['lower'] < _SOFT
 
     def _sensing_fault(self, code: int, index: int) -> None:
         if code in (guard.RANGE, guard.GAP_RANGE):

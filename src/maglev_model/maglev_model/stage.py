@@ -45,6 +45,10 @@ class StageError(RuntimeError):
     """The stage cannot go on; the message says why and what to do."""
 
 
+STOPPED_SINCE = 'stopped since the fault: {}; see to that, and reset again'
+"""What a reset that is refused for a later stop says, with why that came."""
+
+
 class Stage(Protocol):
     """A stage: encoders to read and motors to give currents to, once a sample.
 
@@ -123,7 +127,10 @@ class Stage(Protocol):
         ...
 
     def reset(self) -> tuple[bool, str]:
-        """Clear the fault if its cause is gone, and follow currents again; whether, and a text."""
+        """Clear the fault if its cause is gone, and follow currents again; whether, and a text.
+
+        Refused once after a :meth:`stop` of kind 'stop' that came while a fault was latched.
+        """
         ...
 
     def deactivate(self) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
 from maglev_model.records import Block
-from maglev_model.stage import EncoderSample, Fault, Truth, motor_currents
+from maglev_model.stage import STOPPED_SINCE, EncoderSample, Fault, Truth, motor_currents
 from maglev_plant.arrays import StageArrays, stage_arrays
 from maglev_plant.dynamics import advance
 from maglev_plant.encoder import encode
@@ -66,6 +66,7 @@ class SimulatedStage:
         self.sample_time = self.parameters.sample_time
         self.watchdog = self.parameters.watchdog
         self.fault: Fault | None = None
+        self._stopped_since = ''  # why, while a fault was latched
         self._arrays = stage_arrays(self.parameters)
         self._first = True
         self._landed = False
@@ -178,11 +179,19 @@ class SimulatedStage:
         self.deactivate()
 
     def stop(self, why: str = 'emergency stop', kind: str = 'stop', remedy: str = '') -> None:
-        """Cut the currents and latch a fault with that reason."""
+        """Cut the currents and latch a fault with that reason.
+
+        Where one is latched already, the next reset is refused: who asks for it may not know.
+        """
+        if kind == 'stop' and self.fault is not None:
+            self._stopped_since = why
         self._latch(kind, why, remedy or 'see to what made it necessary')
 
     def reset(self) -> tuple[bool, str]:
-        """Clear the latched fault and follow currents again; whether there was need to."""
+        """Clear the latched fault and follow currents again; whether it did."""
+        if self._stopped_since:
+            why, self._stopped_since = self._stopped_since, ''
+            return False, STOPPED_SINCE.format(why)
         fault, landed = self.fault, self._landed
         self.fault, self._landed = None, False
         if fault is not None:
