@@ -145,6 +145,26 @@ def test_noise_is_lost_after_its_second_leap(encoder: int) -> None:
     assert failed(flight) == {encoder}
 
 
+@pytest.mark.parametrize('counts', [6, 30, 80])
+@pytest.mark.parametrize('gap', [(), (3,)])
+def test_where_x_and_z_are_both_noisy_they_are_followed_slowly(
+    gap: tuple[int, ...], counts: int
+) -> None:
+    """Without either, motors out of phase push the platen along before it is down."""
+    flight = airborne(hover(0.0195, 0.004, -0.006))
+    rng = np.random.default_rng(counts)
+    noisy = [*gap, 4, 5]
+    for _ in range(2500):
+        flight.boards.jumps[noisy] = rng.integers(-counts, counts + 1, len(noisy))
+        flight.run(1, controlled=flight.stage.mode is Mode.FOLLOWING)
+        if flight.stage.mode is Mode.DISABLED:
+            break
+    assert {4, 5} <= failed(flight)
+    assert flight.stage.mode is Mode.DISABLED
+    assert flight.rig.impact <= DEGRADED
+    assert np.all(np.abs(flight.rig.state[[2, 4]] - [0.004, -0.006]) < 2e-3)
+
+
 @pytest.mark.parametrize(('counts', 'found'), [(4, False), (9, True)])
 @pytest.mark.parametrize('encoder', range(6))
 def test_how_small_a_slip_is_found(encoder: int, counts: int, found: bool) -> None:

@@ -39,6 +39,7 @@ CONTRADICTED: Final = 2
 SOUND: Final = 0
 PUT_RIGHT: Final = 1  # after a slip
 LOST: Final = 2
+NOISY: Final = 3  # x and z that both leap again and again: better than nothing
 
 _RESIDUAL_SAMPLES = 2
 _PROBATION = 20  # samples after a slip in which noise would leap again
@@ -49,6 +50,8 @@ _DOUBTFUL_RESIDUAL = 6e-5  # [m]
 _GROUND = 1e-3  # this near the lower stop no gap is at stake any more [m]
 _LEAP = 3.5e-5  # in a sample no platen leaves it that fast [m]
 _AGREED = 2e-5  # how near the others must read to what is foretold then [m]
+_TAMED = 0.2  # how much of what is noisy is believed
+_FAR_OFF = 1.5e-3  # what a noisy one says farther off than this is no news [m]
 
 
 class GuardArrays(ObserverArrays):
@@ -63,7 +66,7 @@ class GuardArrays(ObserverArrays):
     soft_lower: Annotated[FloatArray, 5]  # y, x, z, phi, theta [m, rad]
     soft_upper: Annotated[FloatArray, 5]
 
-    trust: Annotated[NDArray[np.int8], 6]  # SOUND, PUT_RIGHT or LOST
+    trust: Annotated[NDArray[np.int8], 6]  # SOUND, PUT_RIGHT, LOST or NOISY
     probation: Annotated[NDArray[np.int8], 6]  # samples that a slip is not followed yet
     offset: Annotated[FloatArray, 6]  # what an encoder reads too much [m]
     blamed: Annotated[NDArray[np.int8], 6]  # found wrong in this sample
@@ -72,6 +75,7 @@ class GuardArrays(ObserverArrays):
     residual: float  # g1 + g3 - g2 - g4 as it is read [m]
     believed: Annotated[FloatArray, 6]  # lengths, put right or by the observer
     past: Annotated[FloatArray, 2, 6]  # believed lengths of the last sample and the one before
+    slip: Annotated[FloatArray, 6]  # what was put right last [m]
     rigid: bool  # whether four believed gaps must be those of a rigid platen
     residual_then: Annotated[FloatArray, 4]  # when a gap encoder counted last [m]
     unseen: Annotated[FloatArray, 6]  # how far it should have moved at least since its last count
@@ -119,23 +123,46 @@ def _drift(g: GuardArrays, i: int) -> float:
 
 
 @compiled
+def _tame(g: GuardArrays, i: int, error: float) -> None:
+    """Believe a little of what is noisy, and nothing where it is far off."""
+    g.believed[i] -= (1.0 - _TAMED) * error if abs(error) < _FAR_OFF else error
+
+
+@compiled
+def _leap(g: GuardArrays, i: int, error: float) -> None:
+    """Put an encoder right that leapt; where it leaps again, do without it.
+
+    But where x and z both leap again and again, they are followed slowly: unseen, the platen would
+    be pushed along by motors out of phase, faster than it lands.
+    """
+    if g.trust[i] == SOUND:
+        g.trust[i], g.probation[i], g.slip[i] = PUT_RIGHT, _PROBATION, error
+        g.offset[i] += error
+        g.believed[i] -= error
+    elif i >= 4 and g.trust[9 - i] != SOUND:
+        g.trust[i], g.probation[i] = NOISY, 0
+        g.offset[i] -= g.slip[i]
+        g.believed[i] -= error
+    else:
+        g.trust[i] = LOST
+
+
+@compiled
 def _slips(g: GuardArrays) -> bool:
     """Find and put right what leaps; whether there is some."""
     found = False
     for i in range(6):
         step = g.believed[i] - g.past[0, i]
         error = step - g.step[i]
+        if g.trust[i] == NOISY:
+            _tame(g, i, error)
+            continue
         again = step - (g.past[0, i] - g.past[1, i])
         away = g.probation[i] == 1 and abs(g.believed[i] - g.length[i]) > g.max_jump + _drift(g, i)
         if g.trust[i] == LOST or (min(abs(error), abs(again)) <= g.max_jump and not away):
             continue
         found, g.blamed[i] = True, 1
-        if g.trust[i] == PUT_RIGHT:
-            g.trust[i] = LOST
-        else:
-            g.trust[i], g.probation[i] = PUT_RIGHT, _PROBATION
-            g.offset[i] += error
-            g.believed[i] -= error
+        _leap(g, i, error)
     return found
 
 
