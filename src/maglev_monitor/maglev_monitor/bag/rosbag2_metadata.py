@@ -25,24 +25,41 @@ class Topic:
     count: int = 0
 
 
-def bag_information(
-    file_name: str, topics: Sequence[Topic], first: int, last: int, custom: Mapping[str, str]
-) -> dict[str, Any]:
-    """``rosbag2_bagfile_information`` of a bag with one mcap file.
+@dataclasses.dataclass
+class Span:
+    """Messages of a bag or of one of its files: their number, least and greatest time [ns]."""
 
-    ``first`` and ``last`` are the least and the greatest time of reception [ns]; ``custom`` is what
-    ``ros2 bag record --custom-data`` would be given.
+    count: int = 0
+    first: int = 1 << 63
+    last: int = 0
+
+    def described(self) -> dict[str, Any]:
+        """As rosbag2 has it."""
+        first = self.first if self.count else 0
+        return {
+            'starting_time': {'nanoseconds_since_epoch': first},
+            'duration': {'nanoseconds': self.last - first},
+            'message_count': self.count,
+        }
+
+
+def bag_information(
+    files: Mapping[str, Span], topics: Sequence[Topic], custom: Mapping[str, str]
+) -> dict[str, Any]:
+    """``rosbag2_bagfile_information`` of a bag with these mcap files.
+
+    ``custom`` is what ``ros2 bag record --custom-data`` would be given.
     """
-    span = {
-        'starting_time': {'nanoseconds_since_epoch': first},
-        'duration': {'nanoseconds': last - first},
-        'message_count': sum(topic.count for topic in topics),
-    }
+    whole = Span(
+        sum(span.count for span in files.values()),
+        min(span.first for span in files.values()),
+        max(span.last for span in files.values()),
+    )
     return {
         'version': _VERSION,
         'storage_identifier': 'mcap',
-        'relative_file_paths': [file_name],
-        **span,
+        'relative_file_paths': list(files),
+        **whole.described(),
         'topics_with_message_count': [
             {
                 'topic_metadata': {
@@ -58,7 +75,7 @@ def bag_information(
         ],
         'compression_format': '',  # chunks are the file's own matter
         'compression_mode': '',
-        'files': [{'path': file_name, **span}],
+        'files': [{'path': name, **span.described()} for name, span in files.items()],
         'custom_data': dict(custom) or None,
         'ros_distro': _DISTRIBUTION,
     }

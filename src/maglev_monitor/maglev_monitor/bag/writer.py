@@ -8,7 +8,7 @@ import os
 import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import IO, cast
+from typing import IO, Any, cast
 
 from mcap.writer import CompressionType, Writer
 from rosbags.interfaces import Qos
@@ -16,9 +16,10 @@ from rosbags.interfaces import Qos
 from maglev_monitor.bag.chunk_file import ChunkFile
 from maglev_monitor.bag.definitions import Definitions, FindMessages
 from maglev_monitor.bag.errors import BagError
-from maglev_monitor.bag.rosbag2_metadata import Topic, as_yaml, bag_information, offered_qos
+from maglev_monitor.bag.rosbag2_metadata import Span, Topic, as_yaml, bag_information, offered_qos
 
 _CHUNK_BYTES = 1 << 19
+_CHUNKS_IN_FILE = 1 << 11  # whose index the writer holds, half a kilobyte each; 11 min of a run
 _SPARE_BYTES = 4 << 20  # what must be left on the disk, for other files as well
 _INDEX_BYTES = 1 << 16  # more than schemas, channels and metadata take at the end of a bag
 _INDEX_BYTES_PER_CHUNK = 1 << 9
@@ -26,6 +27,8 @@ _INDEX_BYTES_PER_CHUNK = 1 << 9
 
 class BagWriter:
     """A bag that is being written. What has been flushed survives a kill.
+
+    A long one goes on in a further file, as rosbag2's do, so that memory does not grow with it.
 
     :param path: folder of the bag, made by :meth:`open`; must not exist.
     :param find_messages: where the .msg files of packages lie that are not ROS's own.
@@ -47,8 +50,9 @@ class BagWriter:
         self._definitions = Definitions(find_messages)
         self._schemas: dict[str, int] = {}
         self._topics: dict[str, Topic] = {}
-        self._first, self._last = 1 << 63, 0  # times in the bag [ns]
-        self._chunks = 0
+        self._files: dict[str, Span] = {}
+        self._chunks = 0  # of the file
+        self._span = Span()  # of the file
         self._file: ChunkFile | None = None
         self._mcap: Writer | None = None
 
@@ -63,15 +67,7 @@ class BagWriter:
             raise BagError(f"'{self.path}' exists already: give another output folder")
         try:
             self.path.mkdir(parents=True)
-            self._file = ChunkFile(self.path / f'{self.path.name}_0.mcap')
-            output = cast(IO[bytes], self._file)
-            self._mcap = Writer(
-                output,
-                chunk_size=_CHUNK_BYTES,
-                compression=self._compression,
-                enable_crcs=False,  # a tenth of what a message costs
-            )
-            self._mcap.start('ros2')
+            self._begin_file()
         except OSError as error:
             raise self._cannot_write(error) from error
         self._keep()
@@ -82,18 +78,9 @@ class BagWriter:
 
     def add_topic(self, topic: str, message_type: str, qos: Sequence[Qos] = ()) -> None:
         """Add a topic with its message definition; unknown ones raise :class:`BagError`."""
-        assert self._mcap is not None
-        definition = self._definitions.of(message_type)
-        if message_type not in self._schemas:
-            text = definition.text.encode()
-            self._schemas[message_type] = self._mcap.register_schema(message_type, 'ros2msg', text)
-        channel = self._mcap.register_channel(
-            topic,
-            'cdr',
-            self._schemas[message_type],
-            {'offered_qos_profiles': offered_qos(qos)},
-        )
-        self._topics[topic] = Topic(topic, message_type, definition.type_hash, qos, channel)
+        type_hash = self._definitions.of(message_type).type_hash
+        channel = self._register(topic, message_type, qos)
+        self._topics[topic] = Topic(topic, message_type, type_hash, qos, channel)
 
     def write(self, topic: str, messages: Iterable[tuple[bytes, int]]) -> None:
         """Write serialized messages of a topic, each with its time in the bag [ns].
@@ -104,7 +91,8 @@ class BagWriter:
         assert self._file is not None
         file, add_message = self._file, self._mcap.add_message
         channel = self._topics[topic].channel
-        count, first, last = 0, self._first, self._last
+        span = self._span
+        count, first, last = 0, span.first, span.last
         try:
             for data, time in messages:
                 add_message(channel, time, data, time)
@@ -119,7 +107,7 @@ class BagWriter:
             raise self._break_off(error) from error
         finally:
             self._topics[topic].count += count
-            self._first, self._last = first, last
+            span.count, span.first, span.last = span.count + count, first, last
 
     def flush(self) -> None:
         """Hand what was written over to the system, so that it survives a kill.
@@ -133,6 +121,8 @@ class BagWriter:
         except OSError as error:
             raise self._break_off(error) from error
         self._keep()
+        if self._chunks >= _CHUNKS_IN_FILE:
+            self._change_files()
 
     def close(self) -> None:
         """Finish the bag with index and metadata; may be called twice.
@@ -144,6 +134,7 @@ class BagWriter:
             return
         try:
             self._finish(file)
+            self._write_metadata()
         except OSError as error:
             with contextlib.suppress(OSError):
                 file.go_back()
@@ -159,15 +150,56 @@ class BagWriter:
             raise OSError(errno.EIO, 'a part of it could not be written')
         self._mcap.flush()  # type: ignore[no-untyped-call]
         file.keep()
-        topics = list(self._topics.values())
-        first = self._first if any(topic.count for topic in topics) else 0
-        information = bag_information(file.path.name, topics, first, self._last, self._custom)
-        self._mcap.add_metadata('rosbag2', {'serialized_metadata': as_yaml(information)})
+        self._mcap.add_metadata('rosbag2', {'serialized_metadata': as_yaml(self._information())})
         self._mcap.finish()  # type: ignore[no-untyped-call]
+
+    def _write_metadata(self) -> None:
         temporary = self.path / 'metadata.yaml.tmp'
-        text = as_yaml({'rosbag2_bagfile_information': information}) + '\n'
+        text = as_yaml({'rosbag2_bagfile_information': self._information()}) + '\n'
         temporary.write_text(text, encoding='utf-8')
         os.replace(temporary, self.path / 'metadata.yaml')
+
+    def _information(self) -> dict[str, Any]:
+        return bag_information(self._files, list(self._topics.values()), self._custom)
+
+    def _begin_file(self) -> None:
+        """Begin the next file, with the topics that are known."""
+        name = f'{self.path.name}_{len(self._files)}.mcap'
+        self._file = ChunkFile(self.path / name)
+        self._mcap = Writer(
+            cast(IO[bytes], self._file),
+            chunk_size=_CHUNK_BYTES,
+            compression=self._compression,
+            enable_crcs=False,  # a tenth of what a message costs
+        )
+        self._mcap.start('ros2')
+        self._files[name] = self._span = Span()
+        self._chunks = 0
+        self._schemas.clear()
+        for topic in self._topics.values():
+            topic.channel = self._register(topic.name, topic.message_type, topic.qos)
+
+    def _register(self, topic: str, message_type: str, qos: Sequence[Qos]) -> int:
+        """Tell the file of a topic; its channel there."""
+        assert self._mcap is not None
+        if message_type not in self._schemas:
+            text = self._definitions.of(message_type).text.encode()
+            self._schemas[message_type] = self._mcap.register_schema(message_type, 'ros2msg', text)
+        offered = {'offered_qos_profiles': offered_qos(qos)}
+        return self._mcap.register_channel(topic, 'cdr', self._schemas[message_type], offered)
+
+    def _change_files(self) -> None:
+        """Finish the file and go on in the next."""
+        assert self._file is not None
+        full = self._file
+        try:
+            self._finish(full)
+            full.keep()
+            self._begin_file()
+            full.close()
+        except OSError as error:
+            raise self._break_off(error) from error
+        self._keep()
 
     def _keep(self) -> None:
         """The file is whole up to here. Is there room for the next chunk and the index?"""
