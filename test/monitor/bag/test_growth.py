@@ -142,3 +142,17 @@ def test_a_file_that_cannot_be_begun_ends_the_recording_in_order(
     bag = Bag(tmp_path / 'bag')
     found = sum(len(batch.samples['reference']) for batch in bag.batches())
     assert found == bag_writer._CHUNKS_IN_FILE - 1  # one for what opening keeps
+
+
+@pytest.mark.usefixtures('short_files')
+def test_killed_where_a_file_begins_nothing_is_lost(
+    tmp_path: Path, messages: dict[str, list[bytes]]
+) -> None:
+    writer = open_bag(tmp_path / 'bag')
+    write_flushed(writer, messages['reference'][0], 30)
+    writer.close()
+    (tmp_path / 'bag' / 'metadata.yaml').unlink()
+    (tmp_path / 'bag' / 'bag_2.mcap').write_bytes(b'\x89MC')
+    bag = Bag(tmp_path / 'bag')
+    assert sum(len(batch.samples['reference']) for batch in bag.batches()) == 30
+    assert any("'bag_2.mcap' is empty" in note for note in bag.notes)

@@ -29,6 +29,8 @@ _CUT_OFF = (
     UnicodeDecodeError,
     struct.error,
 )
+MAGIC_BYTES = 8
+"""What an mcap file begins with."""
 _MESSAGE_HEAD_BYTES = 22  # channel, sequence, time of reception and of publication
 
 

@@ -16,7 +16,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from maglev_model.progress import Progress
 from maglev_monitor.bag.errors import BagError
-from maglev_monitor.bag.mcap_file import McapFile, TopicMessages
+from maglev_monitor.bag.mcap_file import MAGIC_BYTES, McapFile, TopicMessages
 from maglev_monitor.metrics.decoding import KEY_OF_MESSAGE_TYPE, Records, decode
 
 _DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
@@ -93,6 +93,9 @@ class Bag:
             return
         sizes = [path.stat().st_size for path in self.files]
         for number, path in enumerate(self.files):
+            if number and sizes[number] < MAGIC_BYTES:
+                self.notes.append(f"'{path.name}' is empty, it was cut off where it began")
+                continue
             file = McapFile(path)
             recovered = 0
             for messages in file.chunks():
