@@ -73,7 +73,7 @@ def test_a_controller_is_waited_for_and_lands_without_its_reference(
     watching.wait(lambda: landed_without_current(watching))
     assert impact_speed(watching) < 0.05
     assert 'the reference stopped' in graph['controller'].output
-    assert watching.newest(CONTROLLER_STATE).mode == ControllerState.DISABLED
+    watching.wait(lambda: watching.newest(CONTROLLER_STATE).mode == ControllerState.DISABLED)
     answer = watching.call('/controller/enable', True)
     assert answer.success
 
@@ -97,12 +97,12 @@ def test_all_that_a_flight_bears(nodes: Nodes, watching: Observer) -> None:
     assert watching.call('/controller/enable', True).success
     assert watching.call('/reference/lift_off').success
     watching.wait(lambda: airborne(watching))
-    assert watching.newest(CONTROLLER_STATE).mode == ControllerState.REGULATING
+    watching.wait(lambda: watching.newest(CONTROLLER_STATE).mode == ControllerState.REGULATING)
 
     graph['controller'].signal(signal.SIGTERM)
     watching.wait(lambda: not graph['controller'].running)
     assert graph['controller'].wait() == 0
-    assert watching.newest(CONTROLLER_STATE).mode == ControllerState.DISABLED
+    watching.wait(lambda: watching.newest(CONTROLLER_STATE).mode == ControllerState.DISABLED)
     assert impact_speed(watching) < 0.05
     assert gap(watching) == pytest.approx(LOWER_STOP, abs=1e-5)
 
