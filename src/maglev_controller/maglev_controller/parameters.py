@@ -15,7 +15,7 @@ from maglev_controller.learning_parameters import LearningParameters
 from maglev_model.loop_parameters import (
     AxisLoopParameters,
     FundamentalParameters,
-    HorizontalLoopParameters,
+    TranslationLoopParameters,
 )
 from maglev_model.machine import MachineParameters
 from maglev_model.parameters import ParameterError, group, parameter
@@ -62,8 +62,8 @@ class AxisParameters(AxisLoopParameters):
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class HorizontalAxisParameters(HorizontalLoopParameters, AxisParameters):
-    """Internal model and gains of x or z."""
+class TranslationAxisParameters(TranslationLoopParameters, AxisParameters):
+    """Internal model and gains of y, x or z."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -240,7 +240,7 @@ class FrictionParameters:
         within=(0.0, 1e3),
     )
     way: tuple[float, ...] = parameter(
-        (3e-6, 3e-6, 3e-6, 3e-6, 3e-6),
+        (1.5e-6, 1.5e-6, 1.5e-6, 3e-6, 3e-6),
         'way over which it turns after a reversal, per axis',
         unit='m, rad',
         within=(1e-8, 1.0),
@@ -420,9 +420,9 @@ class ControllerParameters:
     modes: ModeParameters = group(ModeParameters)
     winding: WindingParameters = group(WindingParameters)
     learning: LearningParameters = group(LearningParameters)
-    y: AxisParameters = group(AxisParameters)
-    x: HorizontalAxisParameters = group(HorizontalAxisParameters)
-    z: HorizontalAxisParameters = group(HorizontalAxisParameters)
+    y: TranslationAxisParameters = group(TranslationAxisParameters)
+    x: TranslationAxisParameters = group(TranslationAxisParameters)
+    z: TranslationAxisParameters = group(TranslationAxisParameters)
     phi: AxisParameters = group(AxisParameters)
     theta: AxisParameters = group(AxisParameters)
     margins: MarginParameters = group(MarginParameters)

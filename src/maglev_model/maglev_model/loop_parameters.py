@@ -45,15 +45,15 @@ class AxisLoopParameters:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class HorizontalLoopParameters(AxisLoopParameters):
-    """Those of x and z, whose encoders pass more of their counts on than an axis of four gaps."""
+class TranslationLoopParameters(AxisLoopParameters):
+    """Those of y, x and z: somewhat slower than the tilts, whose encoders count more finely."""
 
     bandwidth: float = parameter(
         180.0, 'bandwidth of the feedback, W', unit='rad/s', within=(0.1, 1e4)
     )
     integration: float = parameter(
-        81.0, 'how fast the integrator learns, i', unit='rad/s', within=(1e-3, 1e4)
+        60.0, 'how fast the integrator learns, i', unit='rad/s', within=(1e-3, 1e4)
     )
     learning: float = parameter(
-        9.0, 'how fast the oscillators learn, m', unit='rad/s', within=(1e-3, 1e4)
+        6.0, 'how fast the oscillators learn, m', unit='rad/s', within=(1e-3, 1e4)
     )
