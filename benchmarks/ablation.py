@@ -33,6 +33,12 @@ MISMATCH = {
     'offset.spring_phi': 0.7,
     'offset.spring_theta': 0.7,
 }
+WINDINGS = {
+    'effects.winding.voltage': 28.0,
+    'effects.winding.resistance': 4.0,
+    'effects.winding.inductance': 0.045,
+}
+FOR_WINDINGS = {'winding.voltage': 28.0, 'observer.bandwidth': 500.0}
 NO_FRICTION = {'guide.coulomb': (0.0,) * 5, 'guide.viscous': (0.0,) * 5}
 NO_COUNTS = {'encoder.gap_resolution': 0.0, 'encoder.horizontal_resolution': 0.0}
 
@@ -44,18 +50,19 @@ def on_all_axes(**given: object) -> dict[str, object]:
     return {f'{axis}.{name}': value for axis in AXES for name, value in given.items()}
 
 
-def slower(factor: float) -> dict[str, object]:
+def slower(table: ControllerParameters, factor: float) -> ControllerParameters:
     """All three numbers of every axis by a factor; margins are not what this is about."""
     names = [f'{axis}.{name}' for axis in AXES for name in ('bandwidth', 'integration', 'learning')]
-    given = values(ControllerParameters())
-    return {**{name: factor * given[name] for name in names}, 'margins.override': True}
+    given = values(table)
+    return replace(
+        table, {**{name: factor * given[name] for name in names}, 'margins.override': True}
+    )
 
 
+SPEEDS = {'bandwidth, integration, learning: a half': 0.5, 'a quarter': 0.25, 'an eighth': 0.125}
 ROWS: tuple[tuple[str, Values, Values], ...] = (
     ('default', {}, {}),
-    ('bandwidth, integration, learning: a half', slower(0.5), {}),
-    ('a quarter', slower(0.25), {}),
-    ('an eighth', slower(0.125), {}),
+    *((name, {}, {}) for name in SPEEDS),
     ('internal model: integrator alone', on_all_axes(multiples=(0.0,)), {}),
     ('internal model: integrator and fundamental', on_all_axes(multiples=(0.0, 1.0)), {}),
     ('without friction fed forward', {'friction.adaptation_time': 0.0}, {}),
@@ -66,6 +73,9 @@ ROWS: tuple[tuple[str, Values, Values], ...] = (
     ('encoders without counts', {}, NO_COUNTS),
     ('plant off by 10 and 30 %', {}, MISMATCH),
     ('plant off, integrator alone', on_all_axes(multiples=(0.0,)), MISMATCH),
+    ('28 V, not known to the law', {'winding.voltage': 0.0}, WINDINGS),
+    ('28 V, known', {'winding.voltage': 28.0}, WINDINGS),
+    ('28 V, known, observer of 500 rad/s', FOR_WINDINGS, WINDINGS),
 )
 
 
@@ -95,6 +105,8 @@ def line(name: str, controller: Values, plant: Values, *overlays: str) -> str:
     for kind in ((), ('rough',)):
         files = [PARAMS / f'{name}.yaml' for name in ('controller', *overlays, *kind)]
         table = replace(from_yaml(ControllerParameters, 'controller', *files), controller)
+        if name in SPEEDS:
+            table = slower(table, SPEEDS[name])
         stage = replace(plant_of(PARAMS, *kind), {'initial.position': tuple(HOVER), **plant})
         found.append(cells(table, stage))
     return f'| {name} | {" | ".join(found)} |'

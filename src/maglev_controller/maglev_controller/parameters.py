@@ -12,6 +12,11 @@ from maglev_controller.design.notch import MOST
 from maglev_controller.design.state_space import Mode
 from maglev_controller.foreign_law import ForeignLawParameters
 from maglev_controller.learning_parameters import LearningParameters
+from maglev_controller.supervision_parameters import (
+    MeasurementParameters,
+    OwnLandingParameters,
+    PlatenLostParameters,
+)
 from maglev_model.loop_parameters import (
     AxisLoopParameters,
     FundamentalParameters,
@@ -326,58 +331,6 @@ class LimitParameters:
         'share of the attraction by which two opposite motors may differ; above one half the other '
         'two spare it (exact inverse, levitation first)',
         within=(0.1, 0.9),
-    )
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class MeasurementParameters:
-    """What a measurement must fulfil to be believed."""
-
-    margin: float = parameter(
-        5e-4, 'how far beyond the stops gap, x and z may read', unit='m', within=(0.0, 0.1)
-    )
-    warp: float = parameter(
-        5e-4,
-        'largest |g1 + g3 - g2 - g4|, which is 0 for a rigid platen',
-        unit='m',
-        within=(1e-6, 0.1),
-    )
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class OwnLandingParameters:
-    """The descent the controller makes by itself when the reference is lost."""
-
-    braking_time: float = parameter(
-        0.4, 'time to stop, and to level the tilts', unit='s', within=(0.05, 10.0)
-    )
-    descent_time: float = parameter(
-        1.5, 'time to descend to the lower stop', unit='s', within=(0.1, 60.0)
-    )
-    settle_time: float = parameter(
-        0.5, 'time held on the stop before the current ends', unit='s', within=(0.0, 10.0)
-    )
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class PlatenLostParameters:
-    """When a platen that is pressed against a stop is given up, and landed."""
-
-    distance: float = parameter(
-        2e-4,
-        'an output this near to its stop is at it; of the tilts, at the radius',
-        unit='m',
-        within=(0.0, 0.1),
-    )
-    time: float = parameter(
-        0.5, 'time it is there, without a break', unit='s', within=(0.001, 60.0)
-    )
-    error: tuple[float, ...] = parameter(
-        (1e-3, 1e-3, 1e-3, 1e-3, 1e-3),
-        'with a larger error than this, per axis',
-        unit='m, rad',
-        within=(1e-6, 1.0),
-        length=5,
     )
 
 
