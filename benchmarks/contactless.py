@@ -23,6 +23,7 @@ from maglev_study.references import HOVER, ellipse
 from maglev_study.rough_flights import plant_of
 
 PARAMS = Path(__file__).resolve().parents[1] / 'params'
+FILES = (PARAMS / 'controller.yaml', PARAMS / 'contactless.yaml')
 RUN_IN, MEASURED = 10.0, 20.0  # [s]
 Values = Mapping[str, object]
 NO_NOISE = {'encoder.gap_noise': 0.0, 'encoder.horizontal_noise': 0.0}
@@ -33,7 +34,7 @@ OFF = {'offset.K_v1': 1.1, 'offset.K_h': 0.9, 'offset.spring_phi': 0.7, 'offset.
 
 def speeds(factor: float) -> dict[str, object]:
     """All speeds of the law, the observer's among them, by a factor."""
-    given = ControllerParameters()
+    given = from_yaml(ControllerParameters, 'controller', *FILES)
     scaled = {
         f'{axis}.{name}': factor * getattr(loop, name)
         for axis, loop in zip(AXES, given.axes, strict=True)
@@ -56,8 +57,7 @@ ROWS: tuple[tuple[str, Values, Values], ...] = (
 
 def line(name: str, controller: Values, plant: Values) -> str:
     """One row of the table."""
-    files = [PARAMS / 'controller.yaml', PARAMS / 'contactless.yaml']
-    table = replace(from_yaml(ControllerParameters, 'controller', *files), controller)
+    table = replace(from_yaml(ControllerParameters, 'controller', *FILES), controller)
     stage = plant_of(PARAMS, 'contactless')
     stage = replace(stage, {'initial.position': tuple(HOVER), **plant})
     references = ellipse(RUN_IN + MEASURED, 0.010, stage.sample_time, grow=2.0)

@@ -60,17 +60,7 @@ def command(name: str, options: argparse.Namespace, work: Work) -> int:
 
 
 def _flown(options: argparse.Namespace) -> tuple[int, dict[str, Any]]:
-    from maglev_study.robustness.fleet import make_plan
-
-    plan = make_plan(
-        options.params,
-        options.machines,
-        laws=options.law,
-        names=options.experiment,
-        overlays=options.overlay,
-        seed=options.seed,
-    )
-    options.out.mkdir(parents=True, exist_ok=True)
+    plan = plan_of(options, options.law)
     if options.replay is not None:
         return _write_machine(plan, options.replay, options.out)
     return _fly(plan, options)
@@ -164,8 +154,9 @@ def number(low: int, high: int) -> type[int]:
     return check  # type: ignore[return-value]
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog='robustness', description=__doc__)
+def command_parser(name: str, about: str | None, machines: int) -> argparse.ArgumentParser:
+    """Options of a command that flies machines, ``machines`` of them unless told otherwise."""
+    parser = argparse.ArgumentParser(prog=name, description=about)
     add = parser.add_argument
     add('--params', type=Path, required=True, help='the folder of parameter files')
     add(
@@ -176,15 +167,37 @@ def _parser() -> argparse.ArgumentParser:
         metavar='FILE',
         help="parameters of plant, controller and distributions over every law's own; repeatable",
     )
-    add('--machines', type=number(1, 10**6), default=200, metavar='N', help='how many')
-    add('--law', nargs='+', default=['default'], metavar='NAME', help='the laws (default: default)')
+    add('--machines', type=number(1, 10**6), default=machines, metavar='N', help='how many')
     add('--experiment', nargs='+', default=[], metavar='NAME', help='what is flown (default: all)')
-    add('--seed', type=number(0, 2**53), default=0, metavar='S', help='of the machines')
+    add('--seed', type=number(0, 2**53), default=0, metavar='S', help='of all that is drawn')
     add('--jobs', type=number(1, 512), default=os.cpu_count() or 1, metavar='J', help='processes')
     add('--scheduler', default='', metavar='ADDRESS', help='a Dask cluster, tcp://host:8786')
-    add('--replay', type=number(0, 10**6), metavar='N', help='write one machine for the graph')
-    add('--out', type=Path, default=Path('robustness'), metavar='DIR', help='where results are')
+    add('--out', type=Path, default=Path(name), metavar='DIR', help='where results are left')
     add_output_options(parser)
+    return parser
+
+
+def plan_of(options: argparse.Namespace, laws: Sequence[str]) -> Plan:
+    """What the options of :func:`command_parser` ask for, its folder made."""
+    from maglev_study.robustness.fleet import make_plan
+
+    plan = make_plan(
+        options.params,
+        options.machines,
+        laws=laws,
+        names=options.experiment,
+        overlays=options.overlay,
+        seed=options.seed,
+    )
+    options.out.mkdir(parents=True, exist_ok=True)
+    return plan
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = command_parser('robustness', __doc__, machines=200)
+    add = parser.add_argument
+    add('--law', nargs='+', default=['default'], metavar='NAME', help='the laws (default: default)')
+    add('--replay', type=number(0, 10**6), metavar='N', help='write one machine for the graph')
     return parser
 
 

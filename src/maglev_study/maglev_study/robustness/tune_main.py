@@ -7,14 +7,12 @@ does on machines that it was not tuned on.
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from maglev_model.progress import Progress, add_output_options
-from maglev_study.robustness.main import DONE, command, number
+from maglev_model.progress import Progress
+from maglev_study.robustness.main import DONE, command, command_parser, number, plan_of
 
 if TYPE_CHECKING:
     from maglev_study.robustness.tune import Trial, Tuned
@@ -32,18 +30,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _tuned(options: argparse.Namespace) -> tuple[int, dict[str, Any]]:
-    from maglev_study.robustness.fleet import make_plan
     from maglev_study.robustness.tune import tune
 
-    plan = make_plan(
-        options.params,
-        options.machines,
-        laws=[options.law],
-        names=options.experiment,
-        overlays=options.overlay,
-        seed=options.seed,
-    )
-    options.out.mkdir(parents=True, exist_ok=True)
+    plan = plan_of(options, [options.law])
     progress = Progress('tune', 'tried')
 
     def heard(done: int, trial: Trial) -> None:
@@ -92,27 +81,11 @@ def render(found: Tuned, machines: int, seed: int) -> str:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog='tune', description=__doc__)
+    parser = command_parser('tune', __doc__, machines=40)
     add = parser.add_argument
-    add('--params', type=Path, required=True, help='the folder of parameter files')
-    add(
-        '--overlay',
-        type=Path,
-        action='append',
-        default=[],
-        metavar='FILE',
-        help="parameters over the law's own; repeatable",
-    )
-    add('--machines', type=number(1, 10**6), default=40, metavar='N', help='how many')
     add('--trials', type=number(1, 10**5), default=60, metavar='N', help='how many')
     add('--margin', type=float, default=6.0, metavar='DB', help='guaranteed in all currents')
     add('--law', default='default', metavar='NAME', help='the law that is tuned')
-    add('--experiment', nargs='+', default=[], metavar='NAME', help='what is flown (default: all)')
-    add('--seed', type=number(0, 2**53), default=0, metavar='S', help='of machines and search')
-    add('--jobs', type=number(1, 512), default=os.cpu_count() or 1, metavar='J', help='processes')
-    add('--scheduler', default='', metavar='ADDRESS', help='a Dask cluster, tcp://host:8786')
-    add('--out', type=Path, default=Path('tune'), metavar='DIR', help='where tuned.yaml is left')
-    add_output_options(parser)
     return parser
 
 
