@@ -20,7 +20,7 @@ from maglev_controller.supervision_parameters import (
 from maglev_model.loop_parameters import (
     AxisLoopParameters,
     FundamentalParameters,
-    TranslationLoopParameters,
+    HorizontalLoopParameters,
 )
 from maglev_model.machine import MachineParameters
 from maglev_model.parameters import ParameterError, group, parameter
@@ -67,8 +67,8 @@ class AxisParameters(AxisLoopParameters):
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class TranslationAxisParameters(TranslationLoopParameters, AxisParameters):
-    """Internal model and gains of y, x or z."""
+class HorizontalAxisParameters(HorizontalLoopParameters, AxisParameters):
+    """Internal model and gains of x or z."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -245,7 +245,7 @@ class FrictionParameters:
         within=(0.0, 1e3),
     )
     way: tuple[float, ...] = parameter(
-        (1.5e-6, 1.5e-6, 1.5e-6, 3e-6, 3e-6),
+        (3e-6, 1.5e-6, 1.5e-6, 3e-6, 3e-6),
         'way over which it turns after a reversal, per axis',
         unit='m, rad',
         within=(1e-8, 1.0),
@@ -373,9 +373,9 @@ class ControllerParameters:
     modes: ModeParameters = group(ModeParameters)
     winding: WindingParameters = group(WindingParameters)
     learning: LearningParameters = group(LearningParameters)
-    y: TranslationAxisParameters = group(TranslationAxisParameters)
-    x: TranslationAxisParameters = group(TranslationAxisParameters)
-    z: TranslationAxisParameters = group(TranslationAxisParameters)
+    y: AxisParameters = group(AxisParameters)
+    x: HorizontalAxisParameters = group(HorizontalAxisParameters)
+    z: HorizontalAxisParameters = group(HorizontalAxisParameters)
     phi: AxisParameters = group(AxisParameters)
     theta: AxisParameters = group(AxisParameters)
     margins: MarginParameters = group(MarginParameters)

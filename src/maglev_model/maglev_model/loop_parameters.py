@@ -45,8 +45,8 @@ class AxisLoopParameters:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class TranslationLoopParameters(AxisLoopParameters):
-    """Those of y, x and z: somewhat slower than the tilts, whose encoders count more finely."""
+class HorizontalLoopParameters(AxisLoopParameters):
+    """Those of x and z, whose encoders pass more of their counts on than an axis of four gaps."""
 
     bandwidth: float = parameter(
         180.0, 'bandwidth of the feedback, W', unit='rad/s', within=(0.1, 1e4)

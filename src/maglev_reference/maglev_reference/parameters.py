@@ -9,7 +9,7 @@ from maglev_model.guide import GuideParameters
 from maglev_model.loop_parameters import (
     AxisLoopParameters,
     FundamentalParameters,
-    TranslationLoopParameters,
+    HorizontalLoopParameters,
 )
 from maglev_model.machine import MachineParameters
 from maglev_model.parameters import ParameterError, group, parameter
@@ -226,9 +226,9 @@ class ReferenceParameters:
     machine: MachineParameters = group(MachineParameters)
     guide: GuideParameters = group(GuideParameters)
     internal_model: InternalModelParameters = group(InternalModelParameters)
-    y: TranslationLoopParameters = group(TranslationLoopParameters)
-    x: TranslationLoopParameters = group(TranslationLoopParameters)
-    z: TranslationLoopParameters = group(TranslationLoopParameters)
+    y: AxisLoopParameters = group(AxisLoopParameters)
+    x: HorizontalLoopParameters = group(HorizontalLoopParameters)
+    z: HorizontalLoopParameters = group(HorizontalLoopParameters)
     phi: AxisLoopParameters = group(AxisLoopParameters)
     theta: AxisLoopParameters = group(AxisLoopParameters)
 

@@ -36,7 +36,7 @@ PARAMS = Path(__file__).resolve().parents[3] / 'params'
 def flown(plan: Any, _: str, number: int) -> list[Flown]:
     """Errors of y as large as the machine's number and its bandwidth; the tenth machine is lost."""
     (contestant,) = plan.contestants
-    size = (1.0 + number) * contestant.controller.y.bandwidth / 180.0
+    size = (1.0 + number) * contestant.controller.y.bandwidth / 200.0
     mean = 1e-4 * np.array([size, 1.0, 1.0, 1.0, 1.0])
     verdict = LOST_FLIGHT if number == 10 else FLOWN
     return [Flown(number, 'default', 'ellipse', verdict, mean=mean)]
@@ -50,7 +50,7 @@ def test_the_worst_machines_count(monkeypatch: pytest.MonkeyPatch) -> None:
     worst = course.trial(numbers).worst
     assert worst[0] == LOST
     assert worst[1] == pytest.approx(0.5 * (LOST + 1.0))  # two of 21 count, one of them lost
-    slower = {**numbers, 'y': {**numbers['y'], 'bandwidth': 18.0}}
+    slower = {**numbers, 'y': {**numbers['y'], 'bandwidth': 20.0}}
     assert course.trial(slower).worst[0] == pytest.approx(0.5 * (LOST + 2.2))
 
 
