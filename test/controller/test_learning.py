@@ -189,7 +189,7 @@ def test_the_supervisor_learns_what_the_compiled_loop_learns() -> None:
     parameters = build(ControllerParameters, SHORT)
     time = PERIOD * np.arange(1300)[:, None]
     still = held(HOVER, 0.2, PERIOD)
-    omega, size = 2.0 * np.pi / 0.4, np.array([0.0, 2e-3, 1e-3, 0.0, 0.0])
+    omega, size = 2.0 * np.pi / 0.4, np.array([0.0, 2e-4, 1e-4, 0.0, 0.0])
     turning = References(
         HOVER + size * (1.0 - np.cos(omega * time)),
         size * omega * np.sin(omega * time),

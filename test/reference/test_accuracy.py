@@ -208,7 +208,7 @@ def test_the_ellipse_is_held():
     assert warnings(tables('scenario_steps')[0]) == []
     assert summary(tables('scenario_steps')[0]) == []
     [line] = summary(reference)
-    assert 'x 1.5 um' in line
+    assert 'x 1.3 um' in line
     assert 'phi 0.0 urad' in line
 
 

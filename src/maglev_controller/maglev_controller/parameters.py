@@ -245,7 +245,7 @@ class FrictionParameters:
         within=(0.0, 1e3),
     )
     way: tuple[float, ...] = parameter(
-        (3e-6, 1.5e-6, 1.5e-6, 3e-6, 3e-6),
+        (3e-6, 3e-6, 3e-6, 3e-6, 3e-6),
         'way over which it turns after a reversal, per axis',
         unit='m, rad',
         within=(1e-8, 1.0),

@@ -52,8 +52,8 @@ class HorizontalLoopParameters(AxisLoopParameters):
         180.0, 'bandwidth of the feedback, W', unit='rad/s', within=(0.1, 1e4)
     )
     integration: float = parameter(
-        60.0, 'how fast the integrator learns, i', unit='rad/s', within=(1e-3, 1e4)
+        81.0, 'how fast the integrator learns, i', unit='rad/s', within=(1e-3, 1e4)
     )
     learning: float = parameter(
-        6.0, 'how fast the oscillators learn, m', unit='rad/s', within=(1e-3, 1e4)
+        9.0, 'how fast the oscillators learn, m', unit='rad/s', within=(1e-3, 1e4)
     )
