@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,7 @@ import numpy as np
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import MeasurementFault, Regulator
 from maglev_model.axes import AXES, THETA, FloatArray, X, Y, Z
-from maglev_model.parameters import ParameterError, from_yaml, replace, values
+from maglev_model.parameters import ParameterError, from_yaml, read_yaml, replace, values
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
 from maglev_study.closed_loop import run
@@ -34,15 +34,17 @@ MISMATCH = {
     'offset.spring_theta': 0.7,
 }
 WINDINGS = {
-    'effects.winding.voltage': 28.0,
-    'effects.winding.resistance': 4.0,
-    'effects.winding.inductance': 0.045,
+    name: value
+    for name, value in read_yaml(PARAMS / 'rough.yaml', 'plant').items()
+    if name.startswith('effects.winding.')
 }
 FOR_WINDINGS = {'winding.voltage': 28.0, 'observer.bandwidth': 500.0}
 NO_FRICTION = {'guide.coulomb': (0.0,) * 5, 'guide.viscous': (0.0,) * 5}
 NO_COUNTS = {'encoder.gap_resolution': 0.0, 'encoder.horizontal_resolution': 0.0}
 
 Values = Mapping[str, object]
+Change = Values | Callable[[ControllerParameters], Values]
+"""Parameters of the controller, or what makes them of those that it has."""
 
 
 def on_all_axes(**given: object) -> dict[str, object]:
@@ -50,19 +52,22 @@ def on_all_axes(**given: object) -> dict[str, object]:
     return {f'{axis}.{name}': value for axis in AXES for name, value in given.items()}
 
 
-def slower(table: ControllerParameters, factor: float) -> ControllerParameters:
+def slower(factor: float) -> Change:
     """All three numbers of every axis by a factor; margins are not what this is about."""
     names = [f'{axis}.{name}' for axis in AXES for name in ('bandwidth', 'integration', 'learning')]
-    given = values(table)
-    return replace(
-        table, {**{name: factor * given[name] for name in names}, 'margins.override': True}
-    )
+
+    def change(table: ControllerParameters) -> Values:
+        given = values(table)
+        return {**{name: factor * given[name] for name in names}, 'margins.override': True}
+
+    return change
 
 
-SPEEDS = {'bandwidth, integration, learning: a half': 0.5, 'a quarter': 0.25, 'an eighth': 0.125}
-ROWS: tuple[tuple[str, Values, Values], ...] = (
+ROWS: tuple[tuple[str, Change, Values], ...] = (
     ('default', {}, {}),
-    *((name, {}, {}) for name in SPEEDS),
+    ('bandwidth, integration, learning: a half', slower(0.5), {}),
+    ('a quarter', slower(0.25), {}),
+    ('an eighth', slower(0.125), {}),
     ('internal model: integrator alone', on_all_axes(multiples=(0.0,)), {}),
     ('internal model: integrator and fundamental', on_all_axes(multiples=(0.0, 1.0)), {}),
     ('without friction fed forward', {'friction.adaptation_time': 0.0}, {}),
@@ -99,14 +104,13 @@ def cells(table: ControllerParameters, plant: PlantParameters) -> str:
     return ' | '.join(' / '.join(f'{figures[axis]:.1f}' for axis in SHOWN) for figures in found)
 
 
-def line(name: str, controller: Values, plant: Values, *overlays: str) -> str:
+def line(name: str, controller: Change, plant: Values, *overlays: str) -> str:
     """A row: on the benchmark plant, then on the rough one."""
     found = []
     for kind in ((), ('rough',)):
         files = [PARAMS / f'{name}.yaml' for name in ('controller', *overlays, *kind)]
-        table = replace(from_yaml(ControllerParameters, 'controller', *files), controller)
-        if name in SPEEDS:
-            table = slower(table, SPEEDS[name])
+        table = from_yaml(ControllerParameters, 'controller', *files)
+        table = replace(table, controller(table) if callable(controller) else controller)
         stage = replace(plant_of(PARAMS, *kind), {'initial.position': tuple(HOVER), **plant})
         found.append(cells(table, stage))
     return f'| {name} | {" | ".join(found)} |'

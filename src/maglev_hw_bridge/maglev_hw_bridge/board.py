@@ -37,29 +37,22 @@ _SIGNALS = (
 
 
 # Python's own pthread_sigmask makes a set of enums of each mask: 8 µs more, twice a sample
-_SIGMASK = ctypes.PyDLL(None).pthread_sigmask
+_LIBC = ctypes.PyDLL(None)
 _Mask = ctypes.c_ubyte * 128  # a sigset_t, as large as any
-
-
-def _mask(signals: Sequence[signal.Signals]) -> ctypes.Array[ctypes.c_ubyte]:
-    mask = _Mask()
-    for one in signals:
-        ctypes.PyDLL(None).sigaddset(mask, int(one))
-    return mask
-
-
-_BLOCKED = _mask(_SIGNALS)
+_BLOCKED = _Mask()
+for _one in _SIGNALS:
+    _LIBC.sigaddset(_BLOCKED, int(_one))
 
 
 @contextlib.contextmanager
 def undisturbed() -> Iterator[None]:
     """Signals go to other threads, or wait: they interrupt no call here."""
     before = _Mask()
-    _SIGMASK(int(signal.SIG_BLOCK), _BLOCKED, before)
+    _LIBC.pthread_sigmask(int(signal.SIG_BLOCK), _BLOCKED, before)
     try:
         yield
     finally:
-        _SIGMASK(int(signal.SIG_SETMASK), before, None)
+        _LIBC.pthread_sigmask(int(signal.SIG_SETMASK), before, None)
 
 
 def channels(values: Sequence[int]) -> NDArray[np.uint32]:
