@@ -90,6 +90,8 @@ class RecorderNode(MaglevNode[RecorderParameters]):
     def close(self) -> None:
         """Take what still waits and finish the bag."""
         self._poll()
+        self._log_times.end()
+        self._poll()
         try:
             self._writer.close()
         except BagError as error:
@@ -117,13 +119,12 @@ class RecorderNode(MaglevNode[RecorderParameters]):
             return
         try:
             for topic, tap in self._taps.items():
-                messages = list(tap.take())
+                messages = self._log_times.of(type_name(TOPICS[topic]), list(tap.take()))
                 if not messages:
                     continue
                 if tap.topic not in self._writer.counts:
                     self._add_topic(tap.topic, TOPICS[topic])
-                timed = self._log_times.of(type_name(TOPICS[topic]), messages)
-                self._writer.write(tap.topic, timed)
+                self._writer.write(tap.topic, messages)
             now = time.monotonic()
             if now - self._flushed > self.parameters.flush_period:
                 self._flushed = now
