@@ -13,6 +13,7 @@ from maglev_controller.design.state_space import Mode
 from maglev_controller.foreign_law import ForeignLawParameters
 from maglev_controller.learning_parameters import LearningParameters
 from maglev_controller.supervision_parameters import (
+    FollowingParameters,
     MeasurementParameters,
     OwnLandingParameters,
     PlatenLostParameters,
@@ -384,6 +385,7 @@ class ControllerParameters:
     measurement: MeasurementParameters = group(MeasurementParameters)
     landing: OwnLandingParameters = group(OwnLandingParameters)
     lost: PlatenLostParameters = group(PlatenLostParameters)
+    following: FollowingParameters = group(FollowingParameters)
     machine: MachineParameters = group(MachineParameters)
 
     @property

@@ -6,6 +6,7 @@ import numpy as np
 
 from maglev_controller.bumpless_transfer import ModelMaps, check_retuning
 from maglev_controller.design_process import DesignProcess
+from maglev_controller.following_error import FollowingWatch
 from maglev_controller.landing import Landing
 from maglev_controller.learning import iterative_learning
 from maglev_controller.parameters import ControllerParameters
@@ -51,6 +52,7 @@ class Supervisor:
         self._after_landing = Mode.DISABLED
         self._gave_up = False
         self._platen_watch = PlatenWatch(parameters)
+        self._following_watch = FollowingWatch(parameters)
         self._row = -1  # of the reference last followed
         self._may_lift_off = False  # a reference in flight is not followed from its middle
         self._segment = -1
@@ -70,6 +72,7 @@ class Supervisor:
         Landing(self.parameters, rest, np.zeros(5), np.zeros(5)).step()
         self._platen_watch.step(self.regulator.position, self.regulator.error)
         self._platen_watch.reset()
+        self._watch_following(rest, np.zeros(5))
         self._start_afresh()
         self._no_current()
 
@@ -109,6 +112,7 @@ class Supervisor:
                 self.learning = self.learning.redesigned(regulator.parameters)
         self.regulator, self.parameters = regulator, regulator.parameters
         self._platen_watch = PlatenWatch(regulator.parameters)
+        self._following_watch = FollowingWatch(regulator.parameters)
         self._lower_stop = regulator.parameters.machine.gap_max
         self._hurry()
 
@@ -200,6 +204,7 @@ class Supervisor:
 
     def _start_afresh(self) -> None:
         self.regulator.reset()
+        self._following_watch.reset()
         if self.learning is not None:
             self.learning.rest()
 
@@ -236,6 +241,13 @@ class Supervisor:
         lost = self._platen_watch.step(self.regulator.position, self.regulator.error)
         if lost and self.mode == Mode.REGULATING:
             self._land(lost)
+        self._watch_following(references.position[row], references.velocity[row])
+
+    def _watch_following(self, position: FloatArray, velocity: FloatArray) -> None:
+        """Give up a platen that does not follow: whoever lands it should not rely on this law."""
+        failed = self._following_watch.step(position, velocity, self.regulator.error)
+        if failed and self.flying:
+            self.give_up(failed)
 
     def _land(self, reason: str) -> None:
         references, row = self.references, self._row
@@ -256,6 +268,7 @@ class Supervisor:
             self._no_current()
         else:
             self._regulate(gap, x, z, position, velocity, acceleration)
+            self._watch_following(position, velocity)
 
     def _regulate(
         self,

@@ -57,3 +57,22 @@ class PlatenLostParameters:
         within=(1e-6, 1.0),
         length=5,
     )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class FollowingParameters:
+    """How far the platen may be from its reference before the controller gives up."""
+
+    error: tuple[float, ...] = parameter(
+        (1e-3, 2e-3, 2e-3, 3e-3, 3e-3),
+        'largest error per axis, beyond what jumps of the reference make',
+        unit='m, rad',
+        within=(1e-6, 1.0),
+        length=5,
+    )
+    fading: float = parameter(
+        1.0,
+        'time in which what a jump allows for fades to 37 %',
+        unit='s',
+        within=(0.01, 60.0),
+    )
