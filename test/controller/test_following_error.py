@@ -96,3 +96,17 @@ def test_the_time_of_fading_and_the_bounds_are_parameters() -> None:
         assert not watch.step(ZERO, ZERO, ZERO)
     assert not watch.step(ZERO, ZERO, along(4, 0.199))
     assert watch.step(ZERO, ZERO, along(3, 0.11))
+
+
+def test_where_it_may_be_larger_for_a_time_only_what_lasts_without_a_break_is_too_large() -> None:
+    watch = FollowingWatch(build(ControllerParameters, {'following.time': 0.02}))
+    watch.step(ZERO, ZERO, ZERO)
+    for _ in range(3):
+        for _ in range(20):
+            assert not watch.step(ZERO, ZERO, along(0, 2e-3))
+        assert not watch.step(ZERO, ZERO, ZERO)
+    for _ in range(20):
+        assert not watch.step(ZERO, ZERO, along(0, 2e-3))
+    assert watch.step(ZERO, ZERO, along(0, 2e-3))
+    watch.reset()
+    assert not watch.step(ZERO, ZERO, along(0, 2e-3))

@@ -121,6 +121,7 @@ def test_bag_and_live_run_give_the_same_figures(nodes: Nodes, feeder: Feeder) ->
     feeder.feed()
     assert monitor.wait() == 0, monitor.output
     assert 'verdict: pass' in monitor.output
+    assert feeder.delivered(5.0)
     recorder.signal(signal.SIGINT)
     assert recorder.wait() == 0
     assert recorded(bag) == dict.fromkeys(TOPICS, SAMPLES)

@@ -96,9 +96,11 @@ def test_emergency_stops_in_flight_and_the_way_back(nodes: Nodes, watching: Obse
     graph['plant'].wait_for('currents cut')
     watching.wait(lambda: not np.any(watching.newest(TRUE_STATE).direct_current))
     watching.wait(lambda: gap(watching) < 0.0181)  # the magnets pull it up
-    watching.wait(lambda: mode(watching) == ControllerState.DISABLED)  # having lost its platen
+    watching.wait(lambda: mode(watching) == ControllerState.FAULT)  # it does not follow any more
     assert watching.call('/plant/reset').success
     assert not watching.call('/plant/reset').success
+    assert not watching.call('/controller/enable', True).success
+    assert watching.call('/controller/reset').success
     assert watching.call('/controller/enable', True).success
     samples(watching, 300)
     answer = watching.call('/reference/lift_off')
@@ -150,7 +152,9 @@ def test_a_flight_that_has_lost_its_platen_ends(nodes: Nodes, watching: Observer
     watching.wait(lambda: not graph['reference'].running, timeout=60.0)
     assert graph['reference'].wait() == 1
     assert 'left the run' in graph['reference'].output
-    assert 'the controller lands by itself' in graph['reference'].output
-    assert 'the platen is lost: for 0.5 s at a stop, y is at' in graph['controller'].output
+    assert 'the controller is in a fault' in graph['reference'].output
+    assert "y is 0.00100 m from its reference, more than 'following.error'" in (
+        graph['controller'].output
+    )
     assert gap(watching) == pytest.approx(LOWER_STOP, abs=2e-4)
     assert not [m for m in watching.look()[REFERENCE] if m.phase == Reference.TRACK]

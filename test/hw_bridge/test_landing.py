@@ -280,6 +280,7 @@ def test_a_landing_that_an_amplifier_defeats_is_given_up(current: float, held: b
     assert fault.kind == ('stop' if held else 'current')
     assert ('left its way down' in fault.reason) == fault.cut == (not held)
     assert 'strikes' in fault.reason or held
+    assert fault.reason.startswith('emergency stop')  # what came first is not forgotten
     assert np.max(np.abs(flight.rig.state[[1, 5]])) < 0.5
 
 

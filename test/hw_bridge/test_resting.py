@@ -69,10 +69,11 @@ def test_what_is_heavier_than_any_sound_machine_is_not_lifted() -> None:
     stage.close()
 
 
+@pytest.mark.parametrize('samples', [40, 200])  # shorter, longer than what rests stands still
 @pytest.mark.parametrize(('above', 'ends'), [(0.0, True), (5e-5, False), (1.5e-4, False)])
-def test_what_does_not_rest_yet_is_set_down(above: float, ends: bool) -> None:
+def test_what_does_not_rest_yet_is_set_down(above: float, ends: bool, samples: int) -> None:
     flight = Flight(hover(LOWER_STOP - above))
-    flight.run(40 if above else 200)
+    flight.run(samples if above else 200)
     flight.rig.forget_impact()
     flight.stage.stop()
     assert (flight.stage.mode is Mode.DISABLED) == ends

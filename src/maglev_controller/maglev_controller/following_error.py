@@ -23,6 +23,8 @@ class FollowingArrays(Record):
     period: float  # [s]
     fading: float  # what is left of a jump's allowance a sample later
     most: Annotated[FloatArray, 5]  # error of a reference that does not jump
+    patience: int  # samples in a row for which it may be larger
+    beyond: int  # samples in a row for which it has been
     jumped: Annotated[FloatArray, 5]  # what jumps allow for now
     position: Annotated[FloatArray, 5]  # of the reference, a sample ago
     velocity: Annotated[FloatArray, 5]
@@ -31,7 +33,7 @@ class FollowingArrays(Record):
 
 @compiled
 def _follow(block: Block, position: FloatArray, velocity: FloatArray, error: FloatArray) -> int:
-    """The first axis with too large an error, or -1."""
+    """The first axis with too large an error, for too long, or -1."""
     f: FollowingArrays = block[0]
     failed = -1
     for axis in range(5):
@@ -45,7 +47,8 @@ def _follow(block: Block, position: FloatArray, velocity: FloatArray, error: Flo
         f.jumped[axis] *= f.fading
         f.position[axis], f.velocity[axis] = position[axis], velocity[axis]
     f.begun = True
-    return failed
+    f.beyond = f.beyond + 1 if failed >= 0 else 0
+    return failed if f.beyond > f.patience else -1
 
 
 class FollowingWatch:
@@ -58,11 +61,12 @@ class FollowingWatch:
             period=parameters.sample_time,
             fading=math.exp(-parameters.sample_time / table.fading),
             most=np.where(controlled, table.error, math.inf),
+            patience=round(table.time / parameters.sample_time),
         )
 
     def reset(self) -> None:
         """Begin anew: the first error is no fault."""
-        self._arrays.begun = False
+        self._arrays.begun, self._arrays.beyond = False, 0
 
     def step(self, position: FloatArray, velocity: FloatArray, error: FloatArray) -> str:
         """Take a sample: the reference's position and velocity, and the error, each (5,).

@@ -16,7 +16,6 @@ from maglev_controller.supervision_parameters import (
     FollowingParameters,
     MeasurementParameters,
     OwnLandingParameters,
-    PlatenLostParameters,
 )
 from maglev_model.loop_parameters import (
     AxisLoopParameters,
@@ -384,7 +383,6 @@ class ControllerParameters:
     limits: LimitParameters = group(LimitParameters)
     measurement: MeasurementParameters = group(MeasurementParameters)
     landing: OwnLandingParameters = group(OwnLandingParameters)
-    lost: PlatenLostParameters = group(PlatenLostParameters)
     following: FollowingParameters = group(FollowingParameters)
     machine: MachineParameters = group(MachineParameters)
 

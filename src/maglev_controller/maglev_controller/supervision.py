@@ -10,7 +10,6 @@ from maglev_controller.following_error import FollowingWatch
 from maglev_controller.landing import Landing
 from maglev_controller.learning import iterative_learning
 from maglev_controller.parameters import ControllerParameters
-from maglev_controller.platen_lost import PlatenWatch
 from maglev_controller.reference_buffer import ReferenceBuffer
 from maglev_controller.regulator import MeasurementFault, Regulator
 from maglev_model.axes import FloatArray
@@ -51,7 +50,6 @@ class Supervisor:
         self._landing: Landing | None = None
         self._after_landing = Mode.DISABLED
         self._gave_up = False
-        self._platen_watch = PlatenWatch(parameters)
         self._following_watch = FollowingWatch(parameters)
         self._row = -1  # of the reference last followed
         self._may_lift_off = False  # a reference in flight is not followed from its middle
@@ -70,8 +68,6 @@ class Supervisor:
         rest = np.array([self._lower_stop, 0.0, 0.0, 0.0, 0.0])
         self._regulate(np.full(4, self._lower_stop), 0.0, 0.0, rest, np.zeros(5), np.zeros(5))
         Landing(self.parameters, rest, np.zeros(5), np.zeros(5)).step()
-        self._platen_watch.step(self.regulator.position, self.regulator.error)
-        self._platen_watch.reset()
         self._watch_following(rest, np.zeros(5))
         self._start_afresh()
         self._no_current()
@@ -111,7 +107,6 @@ class Supervisor:
             if self.learning is not None:
                 self.learning = self.learning.redesigned(regulator.parameters)
         self.regulator, self.parameters = regulator, regulator.parameters
-        self._platen_watch = PlatenWatch(regulator.parameters)
         self._following_watch = FollowingWatch(regulator.parameters)
         self._lower_stop = regulator.parameters.machine.gap_max
         self._hurry()
@@ -199,7 +194,6 @@ class Supervisor:
             self._may_lift_off = True
         elif self._may_lift_off:
             self._start_afresh()
-            self._platen_watch.reset()
             self.mode = Mode.REGULATING
 
     def _start_afresh(self) -> None:
@@ -238,9 +232,6 @@ class Supervisor:
         )
         if self.regulator.fault and self.mode == Mode.REGULATING:
             self.stop(self.regulator.fault)
-        lost = self._platen_watch.step(self.regulator.position, self.regulator.error)
-        if lost and self.mode == Mode.REGULATING:
-            self._land(lost)
         self._watch_following(references.position[row], references.velocity[row])
 
     def _watch_following(self, position: FloatArray, velocity: FloatArray) -> None:

@@ -38,28 +38,6 @@ class OwnLandingParameters:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class PlatenLostParameters:
-    """When a platen that is pressed against a stop is given up, and landed."""
-
-    distance: float = parameter(
-        2e-4,
-        'an output this near to its stop is at it; of the tilts, at the radius',
-        unit='m',
-        within=(0.0, 0.1),
-    )
-    time: float = parameter(
-        0.5, 'time it is there, without a break', unit='s', within=(0.001, 60.0)
-    )
-    error: tuple[float, ...] = parameter(
-        (1e-3, 1e-3, 1e-3, 1e-3, 1e-3),
-        'with a larger error than this, per axis',
-        unit='m, rad',
-        within=(1e-6, 1.0),
-        length=5,
-    )
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
 class FollowingParameters:
     """How far the platen may be from its reference before the controller gives up."""
 
@@ -69,6 +47,9 @@ class FollowingParameters:
         unit='m, rad',
         within=(1e-6, 1.0),
         length=5,
+    )
+    time: float = parameter(
+        0.0, 'for which it may be larger, without a break', unit='s', within=(0.0, 60.0)
     )
     fading: float = parameter(
         1.0,

@@ -172,6 +172,8 @@ def _look(g: GuardArrays, flying: bool, counted: Flags) -> None:
     residual = _residual(g.believed)
     for i in range(6):
         counted[i] = g.trust[i] != LOST and g.believed[i] != g.past[0, i]
+        if i >= 4 and counted[i] and abs(g.unseen[i]) > _DOUBT:
+            observer.take_at_its_word(g, i - 3, g.believed[i])
         if counted[i] or not flying or g.samples < _SETTLING or _at_rest(g, i):
             g.unseen[i] = 0.0
         else:

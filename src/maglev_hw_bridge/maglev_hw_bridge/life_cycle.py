@@ -24,6 +24,7 @@ from maglev_hw_bridge.lift import Lift
 from maglev_hw_bridge.memory import Memory
 from maglev_hw_bridge.mode import Mode
 from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.signal_parameters import ENCODER_NAMES
 from maglev_model.stage import STOPPED_SINCE, EncoderSample, Fault, StageError
 
 FloatArray = NDArray[np.float64]
@@ -162,6 +163,9 @@ class StageLife(abc.ABC):
             self.encoders.homed = False
             if self.fault is not None:
                 because = f': {self.fault.reason}'
+            elif lift.silent:
+                names = ', '.join(ENCODER_NAMES[i] for i in lift.silent)
+                because += f'; encoder {names} did not count'
         self.fault = self.fault or latched
         if not lift.fine:
             raise HomingError(

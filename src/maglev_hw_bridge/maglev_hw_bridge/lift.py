@@ -43,6 +43,8 @@ class Lift:
         self.height = height
         self.risen = 0.0  # mean while it was to hover [m]
         self.tilt = 0.0  # greatest then [rad]
+        self._counted = np.zeros(4, np.bool_)  # gap encoders, since it began
+        self._gaps = np.zeros(4)  # read last [m]
         self._period = parameters.sample_time
         self._stiffness, self._damping = np.array(landing.stiffness), np.array(landing.damping)
         self._machine = machine_constants(parameters.machine)
@@ -59,6 +61,11 @@ class Lift:
         """Whether the platen rose as it was to."""
         return 0.5 * self.height < self.risen < 1.5 * self.height and self.tilt <= TILT
 
+    @property
+    def silent(self) -> list[int]:
+        """The gap encoders that have not counted once."""
+        return [int(i) for i in np.flatnonzero(~self._counted)]
+
     def fly(self, stage: Any) -> None:
         """Lift the platen of an active bridge and land; ends early when a fault does.
 
@@ -69,7 +76,8 @@ class Lift:
         watched = stage.guard.arrays
         stage.read()
         stage.hold()
-        rest = float(np.mean(stage.read().gap))
+        self._gaps[:] = stage.read().gap
+        rest = float(np.mean(self._gaps))
         target = watched.position.copy()
         start = target[0]
         target[3:] = 0.0
@@ -115,4 +123,7 @@ class Lift:
         wanted = self._stiffness * error - self._damping * watched.rate
         wanted[0] = max(wanted[0] + push, _MOST_PUSH)
         stage.write(*self._currents(watched.position, wanted))
-        return float(np.mean(stage.read().gap))
+        gaps = stage.read().gap
+        self._counted |= gaps != self._gaps
+        self._gaps[:] = gaps
+        return float(np.mean(gaps))

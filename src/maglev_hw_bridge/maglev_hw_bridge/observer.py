@@ -250,6 +250,19 @@ def alone(o: ObserverArrays, axis: int) -> None:
 
 
 @compiled
+def take_at_its_word(o: ObserverArrays, axis: int, position: float) -> None:
+    """Begin anew, at rest, with an axis that was thought to move: its encoder counts after all.
+
+    What friction held was taken for a disturbance, and the way that the model went alone since
+    would be taken for a much larger one.
+    """
+    o.position[axis] = o.length[3 + axis] = position
+    o.rate[axis] = 0.0
+    o.disturbance[axis] = o.disturbance_then[axis]
+    bound_disturbance(o, axis)
+
+
+@compiled
 def bound_disturbance(o: ObserverArrays, axis: int) -> None:
     """Of an axis that nothing may show any more only friction is believed, of a tilt nothing."""
     bound = o.friction[axis] if axis < PHI else 0.0

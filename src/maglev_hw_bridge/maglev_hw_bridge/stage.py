@@ -183,11 +183,14 @@ class BridgeStage(StageLife):
         above = self._lower_stop - state.length[:4]
         return bool(np.max(above - _SOON * np.minimum(state.rate[0] + tilting, 0.0)) > _LEFT)
 
-    def _on_the_stop(self) -> bool:
-        """Whether the platen rests on its lower stop, so that nothing falls without current."""
+    def _touches(self) -> bool:
+        """Whether the platen is on its lower stop as the encoders have it."""
         y, rate = self.guard.arrays.position[0], self.guard.arrays.rate[0]
-        there = y > self._lower_stop - _ON_THE_STOP and abs(rate) < _AT_REST
-        return bool(there or self._still_samples * self.sample_time >= _REST_TIME)
+        return bool(y > self._lower_stop - _ON_THE_STOP and abs(rate) < _AT_REST)
+
+    def _on_the_stop(self) -> bool:
+        """Whether it may well rest there, though they have it a little above."""
+        return self._touches() or self._still_samples * self.sample_time >= _REST_TIME
 
     def _put_out(self) -> None:
         if self.mode is Mode.LANDING:
@@ -246,6 +249,10 @@ class BridgeStage(StageLife):
             self._disable()
             if flying:
                 reason += faults.consequence_of_cut(self.parameters, self.guard)
+            if self.fault is not None:
+                kind = 'encoder' if self.fault.kind == 'encoder' else kind  # which may be homed
+                reason = f'{self.fault.reason}; then {reason}'
+                remedy = f'{self.fault.remedy}; {remedy}'
         self.fault = Fault(kind, reason, remedy, cut)
         self.why = kind
         if self.mode is Mode.FOLLOWING:
@@ -253,7 +260,7 @@ class BridgeStage(StageLife):
 
     def _begin_landing(self) -> None:
         state, blind = self.guard.arrays, self.guard.blind
-        if not self.flying or self._on_the_stop() or (blind[3:].any() and self._falls_softly()):
+        if not self.flying or self._touches() or (blind[3:].any() and self._falls_softly()):
             self._disable()
             return
         self.mode, self._landing_samples = Mode.LANDING, 0

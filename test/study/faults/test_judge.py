@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from maglev_controller.supervision import Supervisor
 from maglev_hw_bridge import faults
 from maglev_hw_bridge.amplifiers import Amplifiers
 from maglev_hw_bridge.board import Board
@@ -67,6 +68,7 @@ def test_1_what_is_hidden_and_never_found_out(
     flown: Flown, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(BridgeStage, '_sensing_fault', lambda *_: None)
+    monkeypatch.setattr(Supervisor, '_watch_following', lambda *_: None)
     texts = [text for rule, text in flown(*HIDDEN).violations if rule == 1]
     assert 'never found out' in texts[0]
 

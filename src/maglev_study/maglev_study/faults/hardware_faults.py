@@ -60,7 +60,7 @@ def encoders(name: str, which: str) -> Kind:
         lasting = name in ('stuck', 'noise')
         hopeless = lasting and gaps > _DISPENSABLE
         one = f'(?:{"|".join(ENCODER_NAMES[target] for target in fault.targets)})'
-        blame = f'encoder {one}(?:, {one})* (?:jumped|is stuck|reads)|contradict'
+        blame = f'encoder {one}(?:, {one})* (?:jumped|is stuck|reads|did not count)|contradict'
         stuck = fault.targets if name == 'stuck' else ()
         return Expected(CUT if hopeless else DEGRADED, 10, blame, stuck=stuck)
 
