@@ -43,3 +43,24 @@ def test_x_is_missed_near_the_lower_stop_too_when_a_gap_is_lost(
         judge.watch(length, amplifiers.arrays.current, True)
         blamed += judge.blamed
     assert blamed == found
+
+
+def test_x_that_counts_after_all_is_taken_at_its_word() -> None:
+    """What was held is not thrown about by how far the model has gone without it."""
+    judge, amplifiers = guard.Guard(PARAMETERS), Amplifiers(PARAMETERS)
+    length = np.array([0.025, 0.025, 0.025, 0.025, 0.0, 0.0])
+    watched = judge.arrays
+    for _ in range(200):
+        judge.watch(length, np.zeros(12), True)
+        watched.position[0], watched.rate[0], watched.disturbance[0] = 0.025, 0.0, 0.0
+    amplifiers.drive(np.zeros(4), np.array([0.0, 0.3, 0.0, 0.3]), 0.0, 0.0)
+    while abs(watched.unseen[4]) < 8e-5:
+        judge.watch(length, amplifiers.arrays.current, True)
+        assert judge.blamed == []
+    assert abs(watched.rate[X]) > 5e-3
+    length[4] = np.copysign(1e-5, watched.unseen[4])
+    judge.watch(length, amplifiers.arrays.current, True)
+    assert watched.position[X] == pytest.approx(length[4], abs=1e-9)
+    assert watched.rate[X] == 0.0
+    assert abs(watched.disturbance[X]) <= PARAMETERS.fault.friction[X]
+    assert watched.unseen[4] == 0.0

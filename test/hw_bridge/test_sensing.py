@@ -165,6 +165,17 @@ def test_where_x_and_z_are_both_noisy_they_are_followed_slowly(
     assert np.all(np.abs(flight.rig.state[[2, 4]] - [0.004, -0.006]) < 2e-3)
 
 
+def test_x_and_z_that_stop_counting_in_motion_are_not_followed_as_noisy_ones_are() -> None:
+    flight = airborne()
+    flight.boards.stuck[[4, 5]] = True
+    while flight.stage.guard.failed != [4, 5]:
+        flight.step()
+    for _ in range(20):
+        flight.step(False)
+        assert guard.NOISY not in flight.stage.guard.arrays.trust
+    assert list(flight.stage.guard.arrays.trust[4:]) == [guard.LOST, guard.LOST]
+
+
 @pytest.mark.parametrize(('counts', 'found'), [(4, False), (9, True)])
 @pytest.mark.parametrize('encoder', range(6))
 def test_how_small_a_slip_is_found(encoder: int, counts: int, found: bool) -> None:

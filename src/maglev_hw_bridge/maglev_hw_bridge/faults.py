@@ -15,6 +15,8 @@ from maglev_model.axes import AXES
 
 FloatArray = NDArray[np.float64]
 
+_RIGID = 5e-5  # what the gaps of a sound platen contradict each other by at most [m]
+
 
 def range_fault(code: int, index: int, watched: Guard) -> tuple[str, str]:
     """Reason and remedy of a platen out of its soft range, by the code of ``watch``."""
@@ -88,6 +90,8 @@ def astray_fault(watched: Guard) -> tuple[str, str]:
     reason = (
         f'the platen left its stop, to y = {height * 1e3:.2f} mm, though no current was commanded'
     )
+    if abs(watched.residual) > _RIGID:
+        reason += f'; the gaps contradict each other by {watched.residual * 1e6:.0f} um'
     return reason, 'check the amplifiers, one may be stuck on, and the gap encoders'
 
 

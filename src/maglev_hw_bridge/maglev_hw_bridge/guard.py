@@ -129,17 +129,17 @@ def _tame(g: GuardArrays, i: int, error: float) -> None:
 
 
 @compiled
-def _leap(g: GuardArrays, i: int, error: float) -> None:
+def _leap(g: GuardArrays, i: int, error: float, step: float) -> None:
     """Put an encoder right that leapt; where it leaps again, do without it.
 
-    But where x and z both leap again and again, they are followed slowly: unseen, the platen would
+    But where x and z both leap again and again, and count, they are followed slowly: unseen, the platen would
     be pushed along by motors out of phase, faster than it lands.
     """
     if g.trust[i] == SOUND:
         g.trust[i], g.probation[i], g.slip[i] = PUT_RIGHT, _PROBATION, error
         g.offset[i] += error
         g.believed[i] -= error
-    elif i >= 4 and g.trust[9 - i] != SOUND:
+    elif i >= 4 and g.trust[9 - i] != SOUND and step != 0.0:
         g.trust[i], g.probation[i] = NOISY, 0
         g.offset[i] -= g.slip[i]
         g.believed[i] -= error
@@ -162,7 +162,7 @@ def _slips(g: GuardArrays) -> bool:
         if g.trust[i] == LOST or (min(abs(error), abs(again)) <= g.max_jump and not away):
             continue
         found, g.blamed[i] = True, 1
-        _leap(g, i, error)
+        _leap(g, i, error, step)
     return found
 
 
