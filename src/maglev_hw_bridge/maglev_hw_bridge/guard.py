@@ -132,8 +132,8 @@ def _tame(g: GuardArrays, i: int, error: float) -> None:
 def _leap(g: GuardArrays, i: int, error: float, step: float) -> None:
     """Put an encoder right that leapt; where it leaps again, do without it.
 
-    But where x and z both leap again and again, and count, they are followed slowly: unseen, the platen would
-    be pushed along by motors out of phase, faster than it lands.
+    But where x and z both leap again and again, and count, they are followed slowly: unseen, the
+    platen would be pushed along by motors out of phase, faster than it lands.
     """
     if g.trust[i] == SOUND:
         g.trust[i], g.probation[i], g.slip[i] = PUT_RIGHT, _PROBATION, error
