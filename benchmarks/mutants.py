@@ -41,6 +41,8 @@ _BRIDGE = (
 )
 LOOKED_AT_BY: dict[str, tuple[str, ...]] = {
     'maglev_hw_bridge.guard': _BRIDGE,
+    'maglev_hw_bridge.leaps': _BRIDGE,
+    'maglev_hw_bridge.standing_still': _BRIDGE,
     'maglev_hw_bridge.observer': _BRIDGE,
     'maglev_hw_bridge.knock': _BRIDGE,
     'maglev_hw_bridge.landing': _BRIDGE,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from maglev_hw_bridge import guard, observer
+from maglev_hw_bridge import guard, guard_arrays, observer
 from maglev_hw_bridge.amplifiers import Amplifiers
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_model.axes import PHI, THETA, X, Y, Z
@@ -36,7 +36,7 @@ def test_x_is_missed_near_the_lower_stop_too_when_a_gap_is_lost(
     judge, amplifiers = guard.Guard(PARAMETERS), Amplifiers(PARAMETERS)
     y = PARAMETERS.machine.gap_max - 5e-4
     length = np.array([y, y, y, y, 0.0, 0.0])
-    judge.arrays.trust[0] = guard.LOST
+    judge.arrays.trust[0] = guard_arrays.LOST
     amplifiers.drive(np.zeros(4), np.array([0.0, current, 0.0, current]), 0.0, 0.0)
     blamed: list[int] = []
     for _ in range(300):

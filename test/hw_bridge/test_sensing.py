@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from bridge_flight import Flight, ellipse, hover
 
-from maglev_hw_bridge import guard
+from maglev_hw_bridge import guard, guard_arrays
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.stage import Mode
 from maglev_model.parameters import ParameterError
@@ -140,7 +140,7 @@ def test_noise_is_lost_after_its_second_leap(encoder: int) -> None:
     for _ in range(40):
         flight.boards.jumps[encoder] = round(random.normal(0.0, 30.0))
         flight.run(1)
-    assert flight.stage.guard.arrays.trust[encoder] == guard.LOST
+    assert flight.stage.guard.arrays.trust[encoder] == guard_arrays.LOST
     landed(flight, DEGRADED)
     assert failed(flight) == {encoder}
 
@@ -172,8 +172,8 @@ def test_x_and_z_that_stop_counting_in_motion_are_not_followed_as_noisy_ones_are
         flight.step()
     for _ in range(20):
         flight.step(False)
-        assert guard.NOISY not in flight.stage.guard.arrays.trust
-    assert list(flight.stage.guard.arrays.trust[4:]) == [guard.LOST, guard.LOST]
+        assert guard_arrays.NOISY not in flight.stage.guard.arrays.trust
+    assert list(flight.stage.guard.arrays.trust[4:]) == [guard_arrays.LOST, guard_arrays.LOST]
 
 
 @pytest.mark.parametrize(('counts', 'found'), [(4, False), (9, True)])

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from maglev_hw_bridge.guard import GuardArrays
+from maglev_hw_bridge.guard_arrays import GuardArrays
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_model.axes import FloatArray, X, Z
 from maglev_model.compiled import compiled
