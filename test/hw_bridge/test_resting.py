@@ -156,3 +156,23 @@ def test_what_was_moved_while_nobody_looked_has_not_left_its_stop() -> None:
         flight.stage.read()
         flight.stage.write(np.zeros(4), np.zeros(4))
     assert flight.stage.fault is None
+
+
+@pytest.mark.parametrize(
+    ('axis', 'way', 'slid'), [(1, 2e-4, False), (1, -4e-4, True), (2, 4e-4, True)]
+)
+@pytest.mark.parametrize('parked', [50, 150])
+def test_a_platen_that_slides_along_without_current_is_a_fault(
+    axis: int, way: float, slid: bool, parked: int
+) -> None:
+    """One that has stood still there; after a touchdown it may come to rest."""
+    flight = Flight(hover(LOWER_STOP), {'boards.enable_output': 1})
+    flight.run(parked, controlled=False)
+    slid = slid and parked > 100
+    for share in np.linspace(0.0, 1.0, 60):
+        place = LOWER_STOP * (np.arange(5) == 0) + share * way * (np.arange(5) == axis)
+        flight.rig.place(place)
+        flight.stage.read()
+        flight.stage.write(np.zeros(4), np.zeros(4))
+    assert ('slid along' in str(flight.stage.fault)) == slid
+    assert flight.boards.lines.enabled != slid

@@ -95,6 +95,12 @@ def astray_fault(watched: Guard) -> tuple[str, str]:
     return reason, 'check the amplifiers, one may be stuck on, and the gap encoders'
 
 
+def slide_fault() -> tuple[str, str]:
+    """Reason and remedy of a platen that moved along on its stop while no current was commanded."""
+    reason = 'the platen slid along on its stop, though no current was commanded'
+    return reason, 'check the amplifiers, one may be stuck on; or somebody pushed it'
+
+
 def stray_fault() -> tuple[str, str]:
     """Reason and remedy of a landing that is given up, as the amplifiers do not hold the platen."""
     reason = 'the platen left its way down, pulled by what was not commanded'

@@ -25,9 +25,10 @@ FloatArray = NDArray[np.float64]
 
 _ON_THE_STOP, _AT_REST = 1e-5, 3e-3  # nearer the lower stop and slower it rests [m], [m/s]
 _NEAR, _STILL, _REST_TIME = 2e-4, 1e-5, 0.1  # so it does where it moves no more there [m, m, s]
+_PARKED = 1e-4  # nor along x and z [m]
 _CORNERS = np.array([[-1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, -1.0]])  # (5): gaps by phi, theta
 _SOFT = 0.05  # a degraded landing's speed at the stop [m/s]
-_LEFT, _SOON = 3e-4, 0.02  # what rested and is, or soon will be, farther has left it [m], [s]
+_LEFT, _SOON = 3e-4, 0.02  # what rested and is, or soon will be, farther off has left it [m], [s]
 
 
 class BridgeStage(StageLife):
@@ -57,6 +58,9 @@ class BridgeStage(StageLife):
         self._still_samples = 0  # that the platen has stood still near its lower stop,
         self._still_at = 0.0  # and where [m]
         self._rests = False  # has rested there since current flowed last
+        self._parked_samples = 0  # that it has stood still along x and z,
+        self._parked_at = np.zeros(2)  # and where [m]
+        self._was_at = np.zeros(2)  # a sample ago
         self._warm_up()
 
     @classmethod
@@ -173,8 +177,13 @@ class BridgeStage(StageLife):
             self._still_samples, self._still_at = 0, y
         begun = self.guard.arrays.samples > 1  # what rested in a life before may have been moved
         self._rests = begun and not self.flying and (self._rests or self._on_the_stop())
-        if self.mode is Mode.FOLLOWING and self._rests and self._leaves():
+        slides = self._slides()
+        if self.mode is not Mode.FOLLOWING or not self._rests:
+            return
+        if self._leaves():
             self._raise_fault('current', *faults.astray_fault(self.guard))
+        elif slides:
+            self._raise_fault('current', *faults.slide_fault())
 
     def _leaves(self) -> bool:
         """Whether a corner of a platen that rested is off the lower stop, or soon will be."""
@@ -182,6 +191,26 @@ class BridgeStage(StageLife):
         tilting = self.parameters.machine.radius * state.rate[3:] @ _CORNERS
         above = self._lower_stop - state.length[:4]
         return bool(np.max(above - _SOON * np.minimum(state.rate[0] + tilting, 0.0)) > _LEFT)
+
+    def _slides(self) -> bool:
+        """Whether a platen that stood still for a while is off that place along x or z.
+
+        Who leaps from sample to sample was moved, or homed, while nobody looked.
+        """
+        if self.flying:
+            self._parked_samples = 0
+            return False
+        place = self.guard.arrays.position[1:3]
+        away = float(np.max(np.abs(place - self._parked_at)))
+        leapt = float(np.max(np.abs(place - self._was_at))) > _PARKED
+        parked = self._parked_samples * self.sample_time >= _REST_TIME
+        if not leapt and (away < _PARKED or parked):
+            self._parked_samples += 1
+        else:
+            self._parked_samples = 0
+            self._parked_at[:] = place
+        self._was_at[:] = place
+        return parked and not leapt and away > _LEFT
 
     def _touches(self) -> bool:
         """Whether the platen is on its lower stop as the encoders have it."""
