@@ -110,3 +110,18 @@ def test_where_it_may_be_larger_for_a_time_only_what_lasts_without_a_break_is_to
     assert watch.step(ZERO, ZERO, along(0, 2e-3))
     watch.reset()
     assert not watch.step(ZERO, ZERO, along(0, 2e-3))
+
+
+@pytest.mark.parametrize(
+    ('time', 'grace', 'samples'), [(0.0, 0.05, 50), (0.02, 0.05, 50), (0.02, 0.0, 20)]
+)
+def test_after_a_reset_there_may_be_grace(time: float, grace: float, samples: int) -> None:
+    watch = FollowingWatch(build(ControllerParameters, {'following.time': time}))
+    watch.reset(grace)
+    watch.step(ZERO, ZERO, ZERO)
+    assert not any(watch.step(ZERO, ZERO, along(3, 4e-3)) for _ in range(samples))
+    assert watch.step(ZERO, ZERO, along(3, 4e-3))
+    watch.reset()
+    watch.step(ZERO, ZERO, ZERO)
+    assert not any(watch.step(ZERO, ZERO, along(3, 4e-3)) for _ in range(round(time / 1e-3)))
+    assert watch.step(ZERO, ZERO, along(3, 4e-3))

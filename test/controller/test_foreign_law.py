@@ -18,6 +18,7 @@ from maglev_controller.foreign_law import Measurement, Reference
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
 from maglev_controller.supervision import Supervisor
+from maglev_model.controller_watch import Status
 from maglev_model.currents import exact_currents
 from maglev_model.inverse import CURRENT, CurrentLimits
 from maglev_model.machine import machine_constants
@@ -310,6 +311,23 @@ def test_a_landing_is_flown_by_the_controllers_own_law(flight: Flight) -> None:
     assert flight.supervisor.reason == 'landed: disabled'
     assert len(law_of(flight.supervisor.regulator).told) == asked
     assert np.array(flight.states)[:, 0].min() > 0.0245
+
+
+def test_where_it_loses_the_platen_the_controllers_own_law_lands(flight: Flight) -> None:
+    """It answers as it should, and steers aside."""
+    supervisor = flight.supervisor
+    aside = np.array([0.0, 40.0, 0.0, 0.0, 0.0])
+    law_of(supervisor.regulator).answer = lambda m, r: followed(m, r) + aside
+    for _ in range(1000):
+        flight.step()
+        assert supervisor.status != Status.GAVE_UP
+    assert 'x is 0.00' in supervisor.reason
+    assert "'following.error'" in supervisor.reason
+    assert supervisor.mode == Mode.FAULT
+    assert flight.stage.state[0] == pytest.approx(0.031, abs=1e-5)
+    states = np.array(flight.states)
+    touched = int(np.argmax(states[:, 0] > 0.0309))
+    assert abs(states[touched:, 1]).max() < 0.01
 
 
 def test_control_c_is_not_a_mistake() -> None:

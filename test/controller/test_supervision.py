@@ -371,4 +371,4 @@ def test_a_landing_that_does_not_follow_is_given_up_too() -> None:
     modes = [flight.step(Phase.TRACK, HOVER, HOVER[0]) for _ in range(1500)]
     assert set(modes) == {Mode.LANDING, Mode.FAULT}
     assert supervisor.status == Status.GAVE_UP
-    assert 'y is 0.001' in supervisor.reason
+    assert 'y is 0.00' in supervisor.reason

@@ -57,16 +57,18 @@ class FollowingWatch:
     def __init__(self, parameters: ControllerParameters) -> None:
         table = parameters.following
         controlled = [axis.controlled for axis in parameters.axes]
+        self._period, self._time = parameters.sample_time, table.time
         self._arrays = FollowingArrays(
             period=parameters.sample_time,
             fading=math.exp(-parameters.sample_time / table.fading),
             most=np.where(controlled, table.error, math.inf),
-            patience=round(table.time / parameters.sample_time),
         )
+        self.reset()
 
-    def reset(self) -> None:
-        """Begin anew: the first error is no fault."""
+    def reset(self, grace: float = 0.0) -> None:
+        """Begin anew: the first error is no fault, nor a larger one for less than ``grace`` [s]."""
         self._arrays.begun, self._arrays.beyond = False, 0
+        self._arrays.patience = round(max(self._time, grace) / self._period)
 
     def step(self, position: FloatArray, velocity: FloatArray, error: FloatArray) -> str:
         """Take a sample: the reference's position and velocity, and the error, each (5,).

@@ -17,6 +17,7 @@ from maglev_model.controller_watch import Status
 from maglev_model.modes import Mode
 from maglev_model.phases import Phase
 
+_CATCH_UP = 0.3  # time a landing has to bring back a platen that did not follow [s]
 _FLYING_MARGIN = 5e-4  # above the lower stop, beyond encoder and stop compliance [m]
 
 
@@ -235,14 +236,22 @@ class Supervisor:
         self._watch_following(references.position[row], references.velocity[row])
 
     def _watch_following(self, position: FloatArray, velocity: FloatArray) -> None:
-        """Give up a platen that does not follow: whoever lands it should not rely on this law."""
+        """Give up a platen that does not follow: whoever lands it should not rely on this law.
+
+        A law of somebody else's is followed by the controller's own first.
+        """
         failed = self._following_watch.step(position, velocity, self.regulator.error)
-        if failed and self.flying:
+        if not failed or not self.flying:
+            return
+        if self.mode == Mode.REGULATING and self.regulator.foreign is not None:
+            self.stop(failed)
+        else:
             self.give_up(failed)
 
     def _land(self, reason: str) -> None:
         references, row = self.references, self._row
         self.regulator.fall_back(reason)
+        self._following_watch.reset(_CATCH_UP)
         self.mode, self.reason, self._after_landing = Mode.LANDING, reason, Mode.DISABLED
         self._landing = Landing(
             self.parameters,

@@ -25,7 +25,7 @@ FloatArray = NDArray[np.float64]
 
 _ON_THE_STOP, _AT_REST = 1e-5, 3e-3  # nearer the lower stop and slower it rests [m], [m/s]
 _NEAR, _STILL, _REST_TIME = 2e-4, 1e-5, 0.1  # so it does where it moves no more there [m, m, s]
-_PARKED = 1e-4  # nor along x and z [m]
+_PARKED = 1e-4  # so far at most it moves along x and z in that time where it stands [m]
 _CORNERS = np.array([[-1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, -1.0]])  # (5): gaps by phi, theta
 _SOFT = 0.05  # a degraded landing's speed at the stop [m/s]
 _LEFT, _SOON = 3e-4, 0.02  # what rested and is, or soon will be, farther off has left it [m], [s]
