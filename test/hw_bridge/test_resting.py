@@ -176,3 +176,10 @@ def test_a_platen_that_slides_along_without_current_is_a_fault(
         flight.stage.write(np.zeros(4), np.zeros(4))
     assert ('slid along' in str(flight.stage.fault)) == slid
     assert flight.boards.lines.enabled != slid
+    if slid:
+        for _ in range(20):
+            flight.stage.read()
+            flight.stage.write(np.zeros(4), np.zeros(4))
+        assert flight.stage.reset()[0]
+        flight.run(200, controlled=False)
+        assert flight.stage.fault is None  # it stands there now

@@ -204,13 +204,14 @@ class BridgeStage(StageLife):
         away = float(np.max(np.abs(place - self._parked_at)))
         leapt = float(np.max(np.abs(place - self._was_at))) > _PARKED
         parked = self._parked_samples * self.sample_time >= _REST_TIME
-        if not leapt and (away < _PARKED or parked):
-            self._parked_samples += 1
-        else:
+        slid = parked and not leapt and away > _LEFT
+        if leapt or slid or (away >= _PARKED and not parked):
             self._parked_samples = 0
             self._parked_at[:] = place
+        else:
+            self._parked_samples += 1
         self._was_at[:] = place
-        return parked and not leapt and away > _LEFT
+        return slid
 
     def _touches(self) -> bool:
         """Whether the platen is on its lower stop as the encoders have it."""
