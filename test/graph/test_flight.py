@@ -22,7 +22,7 @@ from flight import (
 from graph import Nodes, Observer, Process
 
 from maglev_msgs.msg import ControllerState, Reference
-from maglev_node.topics import CONTROLLER_STATE, MEASUREMENT, REFERENCE
+from maglev_node.topics import CONTROLLER_STATE, MEASUREMENT, REFERENCE, reference_qos
 
 
 def errors_on_time(observer: Observer, first: int) -> np.ndarray:
@@ -105,6 +105,26 @@ def test_all_that_a_flight_bears(nodes: Nodes, watching: Observer) -> None:
     watching.wait(lambda: watching.newest(CONTROLLER_STATE).mode == ControllerState.DISABLED)
     assert impact_speed(watching) < 0.05
     assert gap(watching) == pytest.approx(LOWER_STOP, abs=1e-5)
+
+
+def test_in_flight_one_reference_is_followed(nodes: Nodes, watching: Observer) -> None:
+    """One that comes later speaks further ahead, of another place, and with numbers of its own."""
+    graph = fly(nodes, LONG)
+    watching.wait(lambda: airborne(watching))
+    time.sleep(5.0)  # while it is young, a reference leaves where there is another
+    second = watching.node.create_publisher(Reference, REFERENCE, reference_qos())
+    stray = Reference(phase=Reference.HOLD, position=[0.02, 0.02, 0.0, 0.0, 0.0], session=7)
+    begin = watching.newest(MEASUREMENT).sequence
+    while 'another reference is not followed' not in graph['controller'].output:
+        stray.sequence = watching.newest(MEASUREMENT).sequence + 100
+        second.publish(stray)
+        assert stray.sequence < begin + 20_000
+        time.sleep(1e-3)
+    samples(watching, 500)
+    flown = [m for m in watching.look()[CONTROLLER_STATE] if m.sequence > begin]
+    assert {message.mode for message in flown} == {ControllerState.REGULATING}
+    assert np.max(np.abs([message.error[:3] for message in flown])) < 50e-6
+    watching.node.destroy_publisher(second)
 
 
 @pytest.mark.alone

@@ -90,6 +90,10 @@ def test_in_flight_one_controller_in_order_or_none(events: list[Message | str]) 
                 assert not before or event.session == flown
                 own = [number for session, number in flight.followed if session == event.session]
                 assert own[-1] == max(own)
+            elif verdict is Verdict.ELSEWHERE:
+                assert before
+                assert flight.watch.session == flown != event.session != NOBODY
+                assert event._replace(age=0) == REST._replace(session=event.session, stamped=False)
             elif before:
                 assert not flight.watch.taken_up  # whatever comes, it lands
                 assert flight.ended
@@ -128,6 +132,25 @@ def test_taken_up_at_rest_with_a_prompt_answer() -> None:
         assert flight.hear(message) is Verdict.IGNORED
         assert why in flight.watch.why
     assert flight.watch.session == 1
+
+
+def test_who_rests_at_another_stage_does_not_end_a_flight() -> None:
+    flight = Flight()
+    flight.hear(REST)
+    flight.sample += 1
+    flight.hear(Message())
+    stranger = REST._replace(session=2, age=9, stamped=False)
+    assert flight.hear(stranger) is Verdict.ELSEWHERE
+    assert 'another stage' in flight.watch.why
+    flight.sample += 1
+    assert flight.hear(Message()) is Verdict.FOLLOWED
+    for change in ({'stamped': True}, {'current': 1.0}, {'status': Status.FLYING}, {'session': 0}):
+        again = Flight()
+        again.hear(REST)
+        again.sample += 1
+        again.hear(Message())
+        again.sample += 1
+        assert again.hear(stranger._replace(**change)) is Verdict.REFUSED
 
 
 def test_who_gives_up_at_rest_has_to_be_taken_up_again() -> None:

@@ -19,6 +19,8 @@ from maglev_model.phases import Phase
 from maglev_monitor.bag.writer import BagWriter
 
 FORMER = {
+    'Reference': 'std_msgs/Header header\nuint64 sequence\nuint8 phase\nuint32 segment\n'
+    'float64[5] position\nfloat64[5] velocity\nfloat64[5] acceleration\nfloat64[5] target\n',
     'Currents': 'std_msgs/Header header\nuint64 sequence\nfloat64[4] direct_current\n'
     'float64[4] quadrature_current\n',
     'Measurement': 'std_msgs/Header header\nuint64 sequence\nfloat64[4] gap\nfloat64 x\nfloat64 z\n'
@@ -148,6 +150,7 @@ class Encoder:
                 np.full(5, 1.0),
                 np.full(5, 2.0),
                 run.target[n],
+                *(() if self._former else (SESSION,)),
             ),
             'measurement': (
                 run.gap[n],

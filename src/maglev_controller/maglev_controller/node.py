@@ -123,8 +123,11 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         """Take what has arrived ahead of time, in bursts: being woken for each slows the loop."""
         references = self.supervisor.references
         for message, _ in self._references.take():
-            if message.sequence <= references.newest and self.supervisor.flying:
-                continue  # of a second reference, which will find the first and leave
+            follows = references.continued_by(message.session, message.sequence)
+            if self.supervisor.flying and not follows:  # a second finds the first and leaves
+                if message.session != references.session:
+                    self.get_logger().warning('another reference is not followed', once=True)
+                continue
             references.store(
                 message.sequence,
                 message.phase,
@@ -132,6 +135,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
                 message.position,
                 message.velocity,
                 message.acceleration,
+                message.session,
             )
             self._reference_lost = False
             self._reference_over = message.phase == Phase.END

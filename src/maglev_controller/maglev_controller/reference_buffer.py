@@ -24,6 +24,7 @@ class ReferenceBuffer:
         self.velocity: NDArray[np.float64] = np.zeros((capacity, 5))
         self.acceleration: NDArray[np.float64] = np.zeros((capacity, 5))
         self.newest = -1
+        self.session = 0
         self.renewed = False
 
     def clear(self) -> None:
@@ -37,6 +38,10 @@ class ReferenceBuffer:
         if not self.renewed:
             self.clear()
 
+    def continued_by(self, session: int, sequence: int) -> bool:
+        """Whether a reference is of the sender of those held, and newer than all of them."""
+        return session == self.session and sequence > self.newest
+
     def store(
         self,
         sequence: int,
@@ -45,8 +50,9 @@ class ReferenceBuffer:
         position: ArrayLike,
         velocity: ArrayLike,
         acceleration: ArrayLike,
+        session: int = 0,
     ) -> None:
-        """Keep the reference of one sample; arrays (5,) in output order."""
+        """Keep the reference of one sample; arrays (5,) in output order, ``session`` its sender."""
         if sequence <= self.newest:
             self.clear()
             self.renewed = True
@@ -57,7 +63,7 @@ class ReferenceBuffer:
         self.position[row] = position
         self.velocity[row] = velocity
         self.acceleration[row] = acceleration
-        self.newest = sequence
+        self.newest, self.session = sequence, session
 
     def find(self, sequence: int) -> int:
         """The row of a sample's reference, -1 when it has not arrived or is forgotten."""

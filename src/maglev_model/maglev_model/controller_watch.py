@@ -28,6 +28,7 @@ class Verdict(enum.Enum):
 
     FOLLOWED = 'its currents are fresh'
     IGNORED = 'nothing: no current flows, or the stage comes down by itself already'
+    ELSEWHERE = 'nothing: it is no answer to this stage'
     REFUSED = 'in flight a fault: the stage comes down by itself'
 
 
@@ -38,7 +39,9 @@ class ControllerWatch:
     is known by its session. In flight its commands are followed, in the order of their samples.
     Anything else that comes in flight means that somebody else commands as well, or that the
     controller does not know what it does: it is refused, and the stage has no controller until it
-    takes one up again. How old currents may be is the stage's to judge.
+    takes one up again. Only a stranger that rests and answers the sample of another stage is left
+    alone: two graphs that have just met, of which the later one will leave. How old currents may
+    be is the stage's to judge.
     """
 
     def __init__(self) -> None:
@@ -77,10 +80,15 @@ class ControllerWatch:
         known = session == self.session and self.taken_up
         self.gave_up = known and status == Status.GAVE_UP
         self.why = self._disorder(sequence, status, stamped, sample)
-        resting = status == Status.RESTING and not self.why
-        if resting and (np.any(direct_current) or np.any(quadrature_current)):
+        resting = status == Status.RESTING
+        currents = bool(np.any(direct_current) or np.any(quadrature_current))
+        if resting and currents and not self.why:
             self.why = 'currents came from a controller that says it rests'
         if flying:
+            stranger = self.taken_up and not known and session != NOBODY
+            if stranger and resting and not currents and not stamped:
+                self.why = 'a controller that rests answers another stage'
+                return Verdict.ELSEWHERE
             return self._in_flight(known, sequence)
         return self._at_rest(known, session, sequence, status, sample)
 

@@ -136,7 +136,7 @@ class Sampling(Generic[P, S]):
         if self._timer is None or not (self.answered or self._publisher.watched()):
             return
         verdict = self._judge(message)
-        if message.sequence == self.sequence:
+        if message.sequence == self.sequence and verdict is not Verdict.ELSEWHERE:
             self.answered = True
             if verdict is Verdict.FOLLOWED:
                 self._write(message)
@@ -211,10 +211,13 @@ class Sampling(Generic[P, S]):
         """The newest that are followed, if any; called at the tick, so that none come too late."""
         fresh = None
         for message, _ in self._currents.take():
+            verdict = self._judge(message)
+            if verdict is Verdict.ELSEWHERE:
+                continue
             self._newest = message.sequence
             # A controller that catches up with what it missed at its start is not late.
             self.answered |= message.sequence >= self.sequence - 2
-            if self._judge(message) is Verdict.FOLLOWED:
+            if verdict is Verdict.FOLLOWED:
                 fresh = message
         return fresh
 
@@ -256,6 +259,8 @@ class Sampling(Generic[P, S]):
         )
         if verdict is Verdict.REFUSED and self.stage.fault is None:
             self.stage.stop(controller.why, kind='controller', remedy=_REMEDY)
+        if verdict is Verdict.ELSEWHERE:
+            self._node.get_logger().warning(controller.why, once=True)
         return verdict
 
     def _write(self, message: Currents) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import secrets
 import time
 from collections.abc import Mapping
 from typing import Any, ClassVar
@@ -107,6 +108,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         self._seen = self._reminded = self._looked = time.monotonic()
         self._message = Reference()
         self._message.header.frame_id = 'stage'
+        self._message.session = secrets.randbits(64) | 1
         self._publisher = self.create_publisher(Reference, REFERENCE, reference_qos())
         self._measurements = self.poll(MEASUREMENT, Measurement, sample_qos(1))
         self._states = self.poll(CONTROLLER_STATE, ControllerState, sample_qos(1))

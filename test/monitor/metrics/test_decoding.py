@@ -68,6 +68,7 @@ def test_columns_are_what_was_sent(run: Any, messages: dict[str, list[bytes]]) -
 def test_former_messages_lack_what_was_added(run: Any) -> None:
     former = Encoder(former=True)
     added_since = {
+        'reference': {'session'},
         'measurement': {'wall_time', 'lockstep', 'controller'},
         'controller': {'limited_by'},
         'plant': {'own_length'},

@@ -52,6 +52,7 @@ TOPIC_TYPES = {
                 Field('velocity', '<f8', 5),
                 Field('acceleration', '<f8', 5),
                 Field('target', '<f8', 5),
+                Field('session', '<u8', added=1),
             ),
         ),
         TopicType(
