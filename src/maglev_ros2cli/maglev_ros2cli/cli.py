@@ -78,15 +78,23 @@ def main() -> NoReturn:
     """
     if '_ARGCOMPLETE' in os.environ:
         argcomplete.autocomplete(parser(_words_to_complete()), exclude=['-h', '--help'])
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(_TERMINATED))
+    told_to_end: list[int] = []
+
+    def terminate(*_: object) -> NoReturn:
+        told_to_end.append(_TERMINATED)
+        sys.exit(_TERMINATED)
+
+    signal.signal(signal.SIGTERM, terminate)
     sys.stdout.reconfigure(line_buffering=True)  # type: ignore[union-attr]
     try:
         code: object = run(sys.argv[1:])
     except SystemExit as error:
         code = error.code
     except Exception:
-        sys.excepthook(*sys.exc_info())
-        code = 70
+        code = _TERMINATED  # what the middleware makes of an exit in the midst of it
+        if not told_to_end:
+            sys.excepthook(*sys.exc_info())
+            code = 70
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(OSError):
             stream.flush()
