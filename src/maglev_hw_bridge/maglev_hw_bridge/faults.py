@@ -86,9 +86,11 @@ def consequence_of_cut(parameters: BridgeParameters, watched: Guard) -> str:
 
 def astray_fault(watched: Guard) -> tuple[str, str]:
     """Reason and remedy of a platen that left its stop while no current was commanded."""
-    height = watched.arrays.position[0]
+    gap = watched.arrays.length[:4]
+    most = int(np.argmin(gap))
     reason = (
-        f'the platen left its stop, to y = {height * 1e3:.2f} mm, though no current was commanded'
+        f'the platen left its stop, to {gap[most] * 1e3:.2f} mm at gap {most + 1}, '
+        'though no current was commanded'
     )
     if abs(watched.residual) > _RIGID:
         reason += f'; the gaps contradict each other by {watched.residual * 1e6:.0f} um'

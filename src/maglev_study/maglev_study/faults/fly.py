@@ -226,6 +226,8 @@ class Course:
                 self.step()
         self.judge.may_enable = True
         bridge.cleanup()
+        if self.flight.skip_homing:
+            self.flight.forbidden = ''  # it is homed now
         if bridge.alive and bridge.configure() and bridge.home(vouched=True):
             bridge.activate()
             for _ in range(3):
