@@ -49,7 +49,7 @@ def test_a_law_may_be_a_file_that_lies_anywhere(tmp_path: Path) -> None:
     path.write_text('controller: {ros__parameters: {y: {bandwidth: 150.0}}}\n')
     found = find_contestants(PARAMS, ['default', str(path)])
     assert {one.name: one.controller.y.bandwidth for one in found} == {
-        'default': 200.0,
+        'default': 195.0,
         'mine': 150.0,
     }
     with pytest.raises(ParameterError, match='cannot read'):

@@ -21,6 +21,7 @@ from maglev_model.loop_parameters import (
     AxisLoopParameters,
     FundamentalParameters,
     HorizontalLoopParameters,
+    LevitationLoopParameters,
 )
 from maglev_model.machine import MachineParameters
 from maglev_model.parameters import ParameterError, group, parameter
@@ -64,6 +65,11 @@ class AxisParameters(AxisLoopParameters):
         'E of (17) [1/A], one for all internal-model states or one for each',
         within=(-1e3, 1e3),
     )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class LevitationAxisParameters(LevitationLoopParameters, AxisParameters):
+    """Internal model and gains of y."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -147,7 +153,7 @@ class ObserverParameters:
     """The Kalman filter that estimates position and rate, knowing the accelerations commanded."""
 
     bandwidth: float = parameter(
-        800.0,
+        850.0,
         'where it turns from believing its prediction to believing the encoders',
         unit='rad/s',
         within=(1.0, 1e5),
@@ -245,7 +251,7 @@ class FrictionParameters:
         within=(0.0, 1e3),
     )
     way: tuple[float, ...] = parameter(
-        (3e-6, 3e-6, 3e-6, 3e-6, 3e-6),
+        (2e-6, 3e-6, 3e-6, 3e-6, 3e-6),
         'way over which it turns after a reversal, per axis',
         unit='m, rad',
         within=(1e-8, 1.0),
@@ -373,7 +379,7 @@ class ControllerParameters:
     modes: ModeParameters = group(ModeParameters)
     winding: WindingParameters = group(WindingParameters)
     learning: LearningParameters = group(LearningParameters)
-    y: AxisParameters = group(AxisParameters)
+    y: LevitationAxisParameters = group(LevitationAxisParameters)
     x: HorizontalAxisParameters = group(HorizontalAxisParameters)
     z: HorizontalAxisParameters = group(HorizontalAxisParameters)
     phi: AxisParameters = group(AxisParameters)

@@ -45,6 +45,18 @@ class AxisLoopParameters:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
+class LevitationLoopParameters(AxisLoopParameters):
+    """Those of y, which in 3DOF, where four gaps count alike, lets less of their counts through."""
+
+    bandwidth: float = parameter(
+        195.0, 'bandwidth of the feedback, W', unit='rad/s', within=(0.1, 1e4)
+    )
+    integration: float = parameter(
+        50.0, 'how fast the integrator learns, i', unit='rad/s', within=(1e-3, 1e4)
+    )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class HorizontalLoopParameters(AxisLoopParameters):
     """Those of x and z, whose encoders pass more of their counts on than an axis of four gaps."""
 

@@ -10,6 +10,7 @@ from maglev_model.loop_parameters import (
     AxisLoopParameters,
     FundamentalParameters,
     HorizontalLoopParameters,
+    LevitationLoopParameters,
 )
 from maglev_model.machine import MachineParameters
 from maglev_model.parameters import ParameterError, group, parameter
@@ -226,7 +227,7 @@ class ReferenceParameters:
     machine: MachineParameters = group(MachineParameters)
     guide: GuideParameters = group(GuideParameters)
     internal_model: InternalModelParameters = group(InternalModelParameters)
-    y: AxisLoopParameters = group(AxisLoopParameters)
+    y: LevitationLoopParameters = group(LevitationLoopParameters)
     x: HorizontalLoopParameters = group(HorizontalLoopParameters)
     z: HorizontalLoopParameters = group(HorizontalLoopParameters)
     phi: AxisLoopParameters = group(AxisLoopParameters)

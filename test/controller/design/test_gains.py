@@ -272,11 +272,11 @@ def test_the_default_s_poles_give_the_default_s_gains() -> None:
         (-0.3645, 4.658),
     ]
     poles = {
-        'y.poles_real': (-148.6, *(real for real, _ in upper for _ in range(2))),
-        'y.poles_imaginary': (0.0, *(sign * part for _, part in upper for sign in (1.0, -1.0))),
+        'phi.poles_real': (-148.6, *(real for real, _ in upper for _ in range(2))),
+        'phi.poles_imaginary': (0.0, *(sign * part for _, part in upper for sign in (1.0, -1.0))),
     }
-    by_weights = design_axis(ControllerParameters(), 'y')
-    by_poles = design_axis(build(ControllerParameters, {'y.design': 'poles', **poles}), 'y')
+    by_weights = design_axis(ControllerParameters(), 'phi')
+    by_poles = design_axis(build(ControllerParameters, {'phi.design': 'poles', **poles}), 'phi')
     np.testing.assert_allclose(feedback(by_poles)[:3], feedback(by_weights)[:3], rtol=0.02)
 
 

@@ -36,7 +36,7 @@ PARAMS = Path(__file__).resolve().parents[3] / 'params'
 def flown(plan: Any, _: str, number: int) -> list[Flown]:
     """Errors of y as large as the machine's number and its bandwidth; the tenth machine is lost."""
     (contestant,) = plan.contestants
-    size = (1.0 + number) * contestant.controller.y.bandwidth / 200.0
+    size = (1.0 + number) * contestant.controller.y.bandwidth / 195.0
     mean = 1e-4 * np.array([size, 1.0, 1.0, 1.0, 1.0])
     verdict = LOST_FLIGHT if number == 10 else FLOWN
     return [Flown(number, 'default', 'ellipse', verdict, mean=mean)]
@@ -50,7 +50,7 @@ def test_the_worst_machines_count(monkeypatch: pytest.MonkeyPatch) -> None:
     worst = course.trial(numbers).worst
     assert worst[0] == LOST
     assert worst[1] == pytest.approx(0.5 * (LOST + 1.0))  # two of 21 count, one of them lost
-    slower = {**numbers, 'y': {**numbers['y'], 'bandwidth': 20.0}}
+    slower = {**numbers, 'y': {**numbers['y'], 'bandwidth': 19.5}}
     assert course.trial(slower).worst[0] == pytest.approx(0.5 * (LOST + 2.2))
 
 
@@ -67,7 +67,7 @@ def test_what_is_asked_has_the_margin(monkeypatch: pytest.MonkeyPatch) -> None:
         asked += [each['bandwidth'] for each in numbers.values()]
         search.tell(Trial(numbers, np.array([200.0 / n['bandwidth'] for n in numbers.values()])))
     assert max(asked) <= 200.0 < 1.01 * max(asked)
-    assert search.best()['y']['bandwidth'] == 200.0
+    assert 190.0 < search.best()['y']['bandwidth'] <= 200.0
     with pytest.raises(ParameterError, match='no numbers of y are guaranteed ±50 dB'):
         Search(contestant, 50.0, seed=0).ask()
 
