@@ -13,7 +13,7 @@ from maglev_controller.learning_step import DONE, GREW
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
 from maglev_controller.supervision import Supervisor
-from maglev_model.axes import X
+from maglev_model.axes import X, Y
 from maglev_model.parameters import ParameterError, build, from_yaml, replace
 from maglev_model.phases import Phase
 from maglev_plant.parameters import PlantParameters
@@ -43,10 +43,10 @@ def learned_ellipse(*overlays: str) -> tuple[np.ndarray, IterativeLearning]:
 
 
 def test_eight_passes_of_the_ellipse_on_the_benchmark_plant() -> None:
-    """From measured errors, and by more than a quarter in y, where counts say most."""
+    """From measured errors. Nearly equal starts give 0.66 to 0.78 in y, 0.78 to 0.91 in x and z."""
     error, learning = learned_ellipse()
     assert np.all(error[-2:] <= [0.8, 1.1, 1.1, 0.1, 2.9])
-    assert np.all(error[-1, :3] < [0.75, 0.9, 0.9] * error[0, :3])
+    assert np.all(error[-1, :3] < [0.85, 0.95, 0.95] * error[0, :3])
     assert len(learning.history) == 8
     assert learning.arrays.state['stage'] == DONE
 
@@ -116,6 +116,16 @@ def test_a_growing_error_brings_the_best_back(growth: float, grew: bool) -> None
     assert learning.learning != grew
     if grew:
         np.testing.assert_array_equal(learning.table, kept)
+
+
+def test_an_axis_that_errs_by_less_than_counts_does_not_decide() -> None:
+    """y read as still in the first pass, and off by a part of a count from then on."""
+    learning, control, force = made_up(**{'learning.passes': 4})
+    for n in range(5):
+        control.arrays.sample['error'][Y] = 5e-7 * n
+        pass_by(learning, control, force, factor=0.3)
+    assert learning.arrays.state['stage'] == DONE
+    np.testing.assert_allclose(learning.table[:, X], -force, atol=0.2)
 
 
 def test_what_is_learned_is_limited() -> None:
@@ -189,7 +199,7 @@ def test_the_supervisor_learns_what_the_compiled_loop_learns() -> None:
     parameters = build(ControllerParameters, SHORT)
     time = PERIOD * np.arange(1300)[:, None]
     still = held(HOVER, 0.2, PERIOD)
-    omega, size = 2.0 * np.pi / 0.4, np.array([0.0, 2e-4, 1e-4, 0.0, 0.0])
+    omega, size = 2.0 * np.pi / 0.4, np.array([0.0, 5e-3, 2.5e-3, 0.0, 0.0])
     turning = References(
         HOVER + size * (1.0 - np.cos(omega * time)),
         size * omega * np.sin(omega * time),
@@ -201,7 +211,8 @@ def test_the_supervisor_learns_what_the_compiled_loop_learns() -> None:
     tracks = np.concatenate(
         [[p] * len(r.position) for p, r in ((False, still), (True, turning))] * 2
     )
-    table = build(PlantParameters, {'initial.position': tuple(HOVER)})
+    heavier = 1.2 * parameters.machine.mass_x  # a force to learn
+    table = build(PlantParameters, {'initial.position': tuple(HOVER), 'machine.mass_x': heavier})
     supervisor = Supervisor(parameters)
     assert supervisor.learning is not None
     alone, regulator = copy.deepcopy(supervisor.learning), Regulator(parameters)

@@ -37,7 +37,7 @@ STATE: Final = np.dtype(
         ('growth', 'f8'),  # of a sum of squares
         ('fading', 'f8'),  # share of the way to full or none that is gone in a sample
         ('limit', 'f8', 5),  # [m/s², rad/s²]
-        ('floor', 'f8', 5),  # sum of squares of a pass below which nothing grows
+        ('floor', 'f8', 5),  # sum of squares of a pass below which nothing grows or gets better
         ('stage', 'i8'),  # IDLE to GREW
         ('waits', '?'),  # for the period's beginning, to learn
         ('recorded', 'i8'),  # samples, without a break
@@ -50,7 +50,7 @@ STATE: Final = np.dtype(
         ('flown', 'i8'),  # passes
         ('score', 'f8'),  # the least
         ('sum', 'f8', 5),  # of squared errors in this pass
-        ('first', 'f8', 5),  # the same of the first pass
+        ('first', 'f8', 5),  # the same of the first pass, or the floor where that is larger
         ('least', 'f8', 5),  # of the best
     ],
     align=True,
@@ -138,8 +138,8 @@ def _judge(learning: LearningArrays) -> None:
     for axis in range(5):
         learning.history[state.flown, axis] = np.sqrt(state.sum[axis] / state.samples)
         if state.flown == 0:
-            state.first[axis] = state.sum[axis]
-        score += state.sum[axis] / max(state.first[axis], 1e-30)
+            state.first[axis] = max(state.sum[axis], state.floor[axis])
+        score += state.sum[axis] / state.first[axis]
     state.flown += 1
     if score < NO_WORSE * state.score:
         state.best, state.score = state.used, min(score, state.score)
