@@ -259,6 +259,20 @@ def test_a_late_tick_at_the_next_sample() -> None:
     landed(flight)
 
 
+@pytest.mark.parametrize('late', [3, 8, 14])
+def test_a_bridge_that_catches_up_knows_how_the_platen_moves(late: int) -> None:
+    """The second board's encoders are read at once: they are ahead of the sample they come with."""
+    flight = airborne(samples=400)
+    flight.boards.delay(late)
+    flight.run(late + 2)
+    state = flight.stage.guard.arrays
+    np.testing.assert_allclose(state.position, flight.rig.state[::2], atol=5e-5)
+    np.testing.assert_allclose(state.rate[:3], flight.rig.state[1:6:2], atol=5e-3)
+    assert (flight.stage.fault is None) == (late == 3)
+    if late > 3:
+        landed(flight)
+
+
 def test_a_bridge_that_stops_leaves_0_v_within_20_ms() -> None:
     flight = airborne()
     assert np.any(flight.boards.volts)

@@ -103,17 +103,22 @@ def _judge(g: GuardArrays, current: FloatArray, flying: bool) -> int:
 
 
 @compiled
-def watch(block: Block, length: FloatArray, current: FloatArray, flying: bool) -> tuple[int, int]:
+def watch(
+    block: Block, length: FloatArray, current: FloatArray, flying: bool, behind: int
+) -> tuple[int, int]:
     """Judge one sample: ``length`` (6,), gaps 1..4, x, z [m], after ``current`` (12,) flowed [A].
 
     Returns a code and the first encoder, or the axis, it is about; ``blamed`` has all encoders.
-    Updates position, rate and what is believed. Range and stuck encoders count in flight.
+    Updates position, rate and what is believed. Range and stuck encoders count in flight. So many
+    samples ``behind`` its tick, an encoder that is read at once has moved on by as many steps.
     """
     g: GuardArrays = block[0]
     g.residual = gap_residual(length)
     for i in range(6):
         g.blamed[i] = 0
         g.believed[i] = length[i] - g.offset[i]
+        if behind > 0 and g.samples >= _BEGUN:
+            g.believed[i] -= behind * g.at_once[i] * g.step[i]
     code, index = FINE, 0
     if g.samples < _BEGUN:
         _begin(g)
@@ -155,6 +160,7 @@ class Guard:
             gap_upper=fault.gap_upper,
             soft_lower=fault.lower,
             soft_upper=fault.upper,
+            at_once=[float(board != 0) for board in parameters.encoder.board],
         )
 
     def forget(self) -> None:
@@ -175,9 +181,11 @@ class Guard:
         self.arrays.probation[:] = 0
         self.arrays.offset[:] = 0.0
 
-    def watch(self, length: FloatArray, current: FloatArray, flying: bool) -> tuple[int, int]:
+    def watch(
+        self, length: FloatArray, current: FloatArray, flying: bool, behind: int = 0
+    ) -> tuple[int, int]:
         """Judge one sample; see :func:`watch`."""
-        return watch(self.arrays.block, length, current, flying)
+        return watch(self.arrays.block, length, current, flying, behind)
 
     def lose(self, encoder: int) -> None:
         """Do without an encoder, x (4) or z (5), from now on; its axis rests where it was read."""

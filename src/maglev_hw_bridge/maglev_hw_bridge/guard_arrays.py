@@ -29,6 +29,7 @@ class GuardArrays(ObserverArrays):
     gap_upper: float  # [m]
     soft_lower: Annotated[FloatArray, 5]  # y, x, z, phi, theta [m, rad]
     soft_upper: Annotated[FloatArray, 5]
+    at_once: Annotated[FloatArray, 6]  # 1 where an encoder is read at once, 0: at the tick
 
     trust: Annotated[NDArray[np.int8], 6]  # SOUND, PUT_RIGHT, LOST or NOISY
     probation: Annotated[NDArray[np.int8], 6]  # samples that a slip is not followed yet

@@ -28,6 +28,7 @@ _NEAR, _STILL, _REST_TIME = 2e-4, 1e-5, 0.1  # so it does where it moves no more
 _PARKED = 1e-4  # so far at most it moves along x and z in that time where it stands [m]
 _CORNERS = np.array([[-1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, -1.0]])  # (5): gaps by phi, theta
 _SOFT = 0.05  # a degraded landing's speed at the stop [m/s]
+_ROUNDING = 0.2  # of how many samples late
 _LEFT, _SOON = 3e-4, 0.02  # what rested and is, or soon will be, farther off has left it [m], [s]
 
 
@@ -51,6 +52,8 @@ class BridgeStage(StageLife):
         self.landing = Landing(self.parameters)
         self._knock = Knock(self.parameters)
         self._zero = np.zeros(4)
+        self._flowed = np.zeros(12)  # phase currents until the sample read last [A]
+        self._behind = self._behind_before = 0  # samples that this one, and the last, was late by
         self._lower_stop = self.parameters.machine.gap_max
         self._stale_samples = round(self.parameters.fault.stale / self.sample_time)
         self._longest_stop = round(self.parameters.boards.stop_time / self.sample_time)
@@ -109,7 +112,8 @@ class BridgeStage(StageLife):
         except DriverError as error:
             raise self._lose_boards(error) from error
         length = self.encoders.decode(self._counts)
-        code, index = self.guard.watch(length, self.amplifiers.arrays.current, self.flying)
+        self._keep_up()
+        code, index = self.guard.watch(length, self._flowed, self.flying, self._behind)
         if code != guard.FINE:
             self._sensing_fault(code, index)
         silent = self._knock.look(self.guard.arrays, self.flying)
@@ -122,6 +126,16 @@ class BridgeStage(StageLife):
         if self.driver.late > 0.5 * self.parameters.sample_time:
             self._late()
         return EncoderSample(length[:4].copy(), length.item(4), length.item(5))
+
+    def _keep_up(self) -> None:
+        """Note how far behind its tick the sample is, and what flowed until that.
+
+        What is put out while samples are caught up with flows after the last of them.
+        """
+        if self._behind == 0 or not self.flying:
+            self._flowed[:] = self.amplifiers.arrays.current
+        self._behind_before = self._behind
+        self._behind = int(self.driver.late / self.sample_time + _ROUNDING)
 
     def write(self, direct_current: Any, quadrature_current: Any, age: int = 0) -> None:
         """Currents of motors 1..4 [A], (4,) each, for the sample ``age`` before the last one.
@@ -242,6 +256,8 @@ class BridgeStage(StageLife):
     def _descend(self) -> None:
         state = self.guard.arrays
         self._landing_samples += 1
+        if self._behind < self._behind_before:  # it went on as before while we caught up
+            self.landing.begin(state.position, state.rate, self.guard.blind)
         stopping = self.fault is not None and self.fault.kind == 'stop'
         too_long = stopping and self._landing_samples > self._longest_stop
         if self.landing.step(state.position, state.rate, state.disturbance) or too_long:

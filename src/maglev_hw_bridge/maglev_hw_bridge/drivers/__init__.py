@@ -36,7 +36,10 @@ class Driver(Protocol):
     """
 
     late: float
-    """By how much the sample read last was behind its tick [s]."""
+    """By how much the sample read last was behind its tick [s].
+
+    The first board's encoders are to be those of the tick, the other's may be read that much later.
+    """
 
     stop_pressed: bool
     """Whether the emergency stop input was active at the last :meth:`read` or :meth:`counts`."""
