@@ -83,9 +83,6 @@ take_domain
 TMPDIR=$(mktemp -d "${TMPDIR:-/tmp}/maglev-test.XXXXXX")
 export TMPDIR MAGLEV_TEST_RUN=$TMPDIR ROS_LOG_DIR=$TMPDIR/ros
 export ROS_PYTHON_CHECK_FIELDS=1 MPLBACKEND=Agg
-# The last bits of a design depend on the kernel that OpenBLAS picks for the processor, and on these
-# what happens at the edge of a threshold: the same one wherever there is.
-! grep -qw avx2 /proc/cpuinfo || export OPENBLAS_CORETYPE=Haswell
 export HYPOTHESIS_STORAGE_DIRECTORY=$TMPDIR/hypothesis
 export RUFF_CACHE_DIR=$root/.cache/ruff MYPY_CACHE_DIR=$root/.cache/mypy
 trap finish EXIT

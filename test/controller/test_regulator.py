@@ -186,10 +186,10 @@ def test_the_paper_law_is_equations_14_to_17() -> None:
         rate = 2000.0 / 3.0 * (error - filtered)
         filtered += 2.0 / 3.0 * (error - filtered)
         w = K @ [error, rate, *xi] + xi[0]
-        assert bench.regulator.virtual_input[1] == pytest.approx(w, rel=1e-9, abs=1e-12)
+        assert bench.regulator.virtual_input[1] == pytest.approx(w, rel=1e-7, abs=1e-9)
         wanted = w / h_x
         got = bench.quadrature[1]
-        assert got == pytest.approx(np.clip(wanted, -7.0, 7.0), rel=1e-9, abs=1e-12)
+        assert got == pytest.approx(np.clip(wanted, -7.0, 7.0), rel=1e-7, abs=1e-9)
         saturated += abs(got) == 7.0
         lost = got - wanted
         for _ in range(100):  # the rate of ξ in (17), integrated in small steps

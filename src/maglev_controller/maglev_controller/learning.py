@@ -27,6 +27,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from maglev_controller.control_arrays import ControlArrays
+from maglev_controller.design.digits import rounded
 from maglev_controller.learning_step import (
     DONE,
     GREW,
@@ -198,7 +199,7 @@ def _kernels(bandwidth: float, period: float, delay: int) -> FloatArray:
     # ë in the middle of the sample in which what is fed forward acts
     bend = np.zeros(2 * (delay + 2) + 1)
     bend[2 * delay + 1 :] = np.array([0.5, -0.5, -0.5, 0.5]) / period**2
-    return np.stack([np.pad(low, delay + 2), np.convolve(low, bend)])
+    return rounded(np.stack([np.pad(low, delay + 2), np.convolve(low, bend)]), 12)
 
 
 def _counts(parameters: ControllerParameters) -> FloatArray:

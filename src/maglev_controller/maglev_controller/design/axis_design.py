@@ -9,11 +9,14 @@ import numpy as np
 from scipy.linalg import solve_discrete_are
 
 from maglev_controller.design.derivative import DerivativeFilter
+from maglev_controller.design.digits import rounded
 from maglev_controller.design.internal_model import InternalModel
 from maglev_controller.design.notch import Notch, notch_system
 from maglev_controller.design.observer import NO_OBSERVER, Observer
 from maglev_controller.design.state_space import StateSpace
 from maglev_model.axes import FloatArray
+
+_DIGITS = {'gain': 8, 'drive': 8, 'antiwindup': 8, 'transition': 13}  # oscillators must not decay
 
 
 @dataclasses.dataclass(frozen=True)
@@ -29,6 +32,8 @@ class AxisDesign:
     ``limits.error`` and ``internal_model.largest_error`` say. ``fades``: where the reference rests,
     oscillators fade. ``notches`` filter w but for what is fed forward. ``model`` is the internal
     model that ξ is the state of, where it is one.
+
+    All of it is rounded, see :mod:`~maglev_controller.design.digits`.
     """
 
     gain: FloatArray
@@ -42,6 +47,11 @@ class AxisDesign:
     fades: bool = False
     notches: tuple[Notch, ...] = ()
     model: InternalModel | None = None
+
+    def __post_init__(self) -> None:
+        for name, digits in _DIGITS.items():
+            object.__setattr__(self, name, rounded(getattr(self, name), digits))
+        object.__setattr__(self, 'observer', Observer(*rounded(self.observer, 8).tolist()))
 
     @property
     def order(self) -> int:
