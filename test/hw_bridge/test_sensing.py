@@ -167,6 +167,48 @@ def test_where_x_and_z_are_both_noisy_they_are_followed_slowly(
     assert np.all(np.abs(flight.rig.state[[2, 4]] - [0.004, -0.006]) < 2e-3)
 
 
+@pytest.mark.parametrize('encoder', [4, 5])
+def test_x_or_z_that_counts_after_all_is_believed_again(encoder: int) -> None:
+    """As where the motors did not move it, but not the encoder was stuck: a phase that is dead."""
+    flight = airborne(descending)
+    flight.boards.stuck[encoder] = True
+    while flight.stage.guard.failed != [encoder]:
+        flight.step()
+    flight.run(20)
+    assert flight.stage.guard.arrays.trust[encoder] == guard_arrays.LOST
+    flight.boards.stuck[encoder] = False
+    flight.run(10)
+    state, axis = flight.stage.guard.arrays, encoder - 3
+    assert state.trust[encoder] == guard_arrays.PUT_RIGHT
+    assert abs(state.position[axis] - flight.rig.state[2 * axis]) < 5e-5
+    landed(flight, DEGRADED)
+    assert abs(state.position[axis] - flight.rig.state[2 * axis]) < 5e-5
+
+
+@pytest.mark.parametrize(
+    ('steps', 'believed'),
+    [
+        ([1, 1, 1, 1, 1], True),
+        ([1, 0, 1, 0, 0, 1, 1, 0, 1], True),
+        ([-2, -2, -1, -3, -1], True),
+        ([1, 1, 1, 1], False),
+        ([1, 1, 1, 1, -1, 1, 1, 1, 1], False),
+        ([60, 60, 60, 60, 60], False),
+    ],
+)
+def test_a_lost_encoder_is_believed_by_counts_one_way(steps: list[int], believed: bool) -> None:
+    watched = guard.Guard(BridgeParameters())
+    length, current = np.array([0.031] * 4 + [0.0, 0.0]), np.zeros(12)
+    for _ in range(4):
+        watched.watch(length, current, False)
+    watched.lose(4)
+    for step in steps:
+        length[4] += 1e-5 * step
+        watched.watch(length, current, False)
+    assert watched.returned == believed
+    assert (watched.arrays.trust[4] == guard_arrays.PUT_RIGHT) == believed
+
+
 def test_x_and_z_that_stop_counting_in_motion_are_not_followed_as_noisy_ones_are() -> None:
     flight = airborne()
     flight.boards.stuck[[4, 5]] = True

@@ -25,7 +25,9 @@ from maglev_hw_bridge.standing_still import (
     doubt,
     find_stuck,
     follow_model,
+    listen,
     look,
+    lose,
 )
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
@@ -119,6 +121,7 @@ def watch(
         g.believed[i] = length[i] - g.offset[i]
         if behind > 0 and g.samples >= _BEGUN:
             g.believed[i] -= behind * g.at_once[i] * g.step[i]
+    listen(g)
     code, index = FINE, 0
     if g.samples < _BEGUN:
         _begin(g)
@@ -135,10 +138,10 @@ def watch(
 
 
 @compiled
-def lose(block: Block, encoder: int) -> None:
+def _lose(block: Block, encoder: int) -> None:
     """See :meth:`Guard.lose`."""
     g: GuardArrays = block[0]
-    g.trust[encoder] = LOST
+    lose(g, encoder)
     for i in range(6):
         g.blamed[i] = 1 if i == encoder else 0
     g.position[encoder - 3] = g.believed[encoder]
@@ -178,6 +181,7 @@ class Guard:
         """Believe every encoder again: they have just been homed."""
         self.forget()
         self.arrays.trust[:] = SOUND
+        self.arrays.stood[:] = 0
         self.arrays.probation[:] = 0
         self.arrays.offset[:] = 0.0
 
@@ -189,7 +193,12 @@ class Guard:
 
     def lose(self, encoder: int) -> None:
         """Do without an encoder, x (4) or z (5), from now on; its axis rests where it was read."""
-        lose(self.arrays.block, encoder)
+        _lose(self.arrays.block, encoder)
+
+    @property
+    def returned(self) -> bool:
+        """Whether x or z, thought to be stuck, is believed again since the last sample."""
+        return self.arrays.returned
 
     @property
     def residual(self) -> float:

@@ -45,6 +45,10 @@ class GuardArrays(ObserverArrays):
     residual_then: Annotated[FloatArray, 4]  # when a gap encoder counted last [m]
     unseen: Annotated[FloatArray, 6]  # how far it should have moved at least since its last count
     silent: Annotated[NDArray[np.int64], 2]  # samples in flight in which x, z have not counted
+    stood: Annotated[NDArray[np.int8], 2]  # 1 where x, z are lost because they stood still
+    read: Annotated[FloatArray, 2]  # by x, z in the last sample, believed or not [m]
+    heard: Annotated[NDArray[np.int64], 2]  # counts one way since they are lost, signed
+    returned: bool  # whether x or z is believed again since this sample
     answered: Annotated[NDArray[np.int8], 4]  # gaps that have counted since the platen rested
     left: Annotated[FloatArray, 4]  # and by how much, leaps aside [m]
 

@@ -116,6 +116,8 @@ class BridgeStage(StageLife):
         code, index = self.guard.watch(length, self._flowed, self.flying, self._behind)
         if code != guard.FINE:
             self._sensing_fault(code, index)
+        if self.guard.returned and self.mode is Mode.LANDING:
+            self._begin_landing()
         silent = self._knock.look(self.guard.arrays, self.flying)
         if silent is not None:
             self.guard.lose(silent)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from maglev_hw_bridge import observer
-from maglev_hw_bridge.guard_arrays import LOST, SOUND, GuardArrays, gap_residual
+from maglev_hw_bridge.guard_arrays import LOST, PUT_RIGHT, SOUND, GuardArrays, gap_residual
 from maglev_hw_bridge.observer import Flags
 from maglev_model.axes import PHI, THETA, X, Y, Z
 from maglev_model.compiled import compiled
@@ -22,6 +22,8 @@ _DOUBT = 2.5e-5  # an encoder that should have moved this far is not followed [m
 _CERTAIN = 1.5  # as many times max_unseen it is stuck whatever the others read
 _DOUBTFUL_RESIDUAL = 6e-5  # [m]
 _GROUND = 1e-3  # this near the lower stop no gap is at stake any more [m]
+_HEARD = 5  # counts one way that no stuck encoder makes
+_FASTEST = 5e-4  # in a sample [m]
 _LEAP = 3.5e-5  # in a sample no platen leaves it that fast [m]
 _AGREED = 2e-5  # how near the others must read to what is foretold then [m]
 
@@ -134,6 +136,35 @@ def doubt(g: GuardArrays, flying: bool, doubted: Flags) -> int:
 
 
 @compiled
+def lose(g: GuardArrays, i: int) -> None:
+    """Do without an encoder that stands still."""
+    g.trust[i] = LOST
+    if i >= 4:
+        g.stood[i - 4], g.heard[i - 4] = 1, 0
+
+
+@compiled
+def listen(g: GuardArrays) -> None:
+    """Believe x or z again that was lost because it stood still, and counts after all.
+
+    It was the motors that did not move it, as with a phase that is dead, and now they do.
+    """
+    g.returned = False
+    for k in range(2):
+        step, g.read[k] = g.believed[4 + k] - g.read[k], g.believed[4 + k]
+        if g.trust[4 + k] != LOST or g.stood[k] == 0 or step == 0.0:
+            continue
+        way = 1 if step > 0.0 else -1
+        if abs(step) > _FASTEST or way * g.heard[k] < 0:
+            g.heard[k] = 0
+        g.heard[k] += way
+        if abs(g.heard[k]) >= _HEARD:
+            g.trust[4 + k], g.stood[k], g.returned = PUT_RIGHT, 0, True
+            g.past[:, 4 + k] = g.read[k] - step
+            observer.take_at_its_word(g, X + k, g.read[k] - step)
+
+
+@compiled
 def find_stuck(g: GuardArrays, doubted: Flags, doubt: int) -> bool:
     """Do without the encoders that are doubted for too long; whether there are new ones."""
     found = False
@@ -145,7 +176,7 @@ def find_stuck(g: GuardArrays, doubted: Flags, doubt: int) -> bool:
             g.blamed[i], found = 1, True
     for i in range(6):
         if g.blamed[i] != 0 and doubted[i]:
-            g.trust[i] = LOST
+            lose(g, i)
         if i >= 4 and g.trust[i] == LOST:
             observer.bound_disturbance(g, i - 3)
     if found:
