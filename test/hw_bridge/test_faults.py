@@ -273,6 +273,31 @@ def test_a_bridge_that_catches_up_knows_how_the_platen_moves(late: int) -> None:
         landed(flight)
 
 
+@pytest.mark.parametrize('phase', range(12))
+def test_a_dead_phase_near_the_magnets_is_found_and_landed(phase: int) -> None:
+    """Before the tilt that it leaves uncontrolled has gone too far to be undone."""
+    flight = airborne(hover(0.020))
+    flight.boards.dead(phase)
+    flight.run(1500)
+    flight.stage.land('nothing was found')
+    flight.until_no_current()
+    assert flight.rig.impact <= 0.05
+    if phase in (3, 9):  # that commutate i_d at x = 0
+        assert 'do not explain' in str(flight.stage.fault)
+
+
+def test_what_is_unexplained_for_ten_samples_is_a_fault_of_the_motors() -> None:
+    flight = airborne(hover(0.020))
+    flight.boards.dead(3)
+    found = []
+    while flight.stage.fault is None:
+        flight.run(1)
+        found.append(np.abs(flight.stage.guard.arrays.disturbance[3:]).max() > 10.0)
+    assert 'of theta' in str(flight.stage.fault)
+    assert flight.stage.fault.kind == 'current'
+    assert found[-11:] == [False] + 10 * [True]
+
+
 def test_a_bridge_that_stops_leaves_0_v_within_20_ms() -> None:
     flight = airborne()
     assert np.any(flight.boards.volts)

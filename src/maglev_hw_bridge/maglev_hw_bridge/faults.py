@@ -103,6 +103,16 @@ def slide_fault() -> tuple[str, str]:
     return reason, 'check the amplifiers, one may be stuck on; or somebody pushed it'
 
 
+def motor_fault(axis: int, watched: Guard) -> tuple[str, str]:
+    """Reason and remedy of a platen that the motors move otherwise than commanded."""
+    unit = 'm/s^2' if axis < 3 else 'rad/s^2'
+    amount = watched.arrays.disturbance[axis]
+    return (
+        f'the currents commanded do not explain {amount:.1f} {unit} of {AXES[axis]}',
+        'check motors, amplifiers and the cables between them',
+    )
+
+
 def stray_fault() -> tuple[str, str]:
     """Reason and remedy of a landing that is given up, as the amplifiers do not hold the platen."""
     reason = 'the platen left its way down, pulled by what was not commanded'

@@ -20,6 +20,7 @@ from maglev_hw_bridge.leaps import find_leaps
 from maglev_hw_bridge.observer import Flags
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.standing_still import (
+    SETTLING,
     await_lift_off,
     call_the_roll,
     doubt,
@@ -29,7 +30,7 @@ from maglev_hw_bridge.standing_still import (
     look,
     lose,
 )
-from maglev_model.axes import FloatArray
+from maglev_model.axes import FloatArray, Y
 from maglev_model.compiled import compiled
 from maglev_model.records import Block
 
@@ -40,8 +41,10 @@ STUCK: Final = 2
 RESIDUAL: Final = 3
 GAP_RANGE: Final = 4
 RANGE: Final = 5
+MOTORS: Final = 6
 
 _RESIDUAL_SAMPLES = 2
+_UNEXPLAINED_SAMPLES = 10
 _BEGUN = 2  # samples for position and rate
 
 
@@ -64,6 +67,20 @@ def _contradiction(g: GuardArrays) -> bool:
             return False
     g.contradictions = g.contradictions + 1 if abs(gap_residual(g.believed)) > g.max_residual else 0
     return bool(g.contradictions >= _RESIDUAL_SAMPLES)
+
+
+@compiled
+def _unexplained(g: GuardArrays) -> int:
+    """The axis that sound encoders show to move otherwise than commanded, or -1."""
+    seen = not observer.supported(g, Y) and g.samples >= SETTLING
+    for i in range(6):
+        seen = seen and g.trust[i] == SOUND
+    for axis in range(5):
+        large = seen and abs(g.disturbance[axis]) > g.max_unexplained[axis]
+        g.unexplained[axis] = g.unexplained[axis] + 1 if large else 0
+        if g.unexplained[axis] >= _UNEXPLAINED_SAMPLES:
+            return axis
+    return -1
 
 
 @compiled
@@ -131,7 +148,11 @@ def watch(
             if g.blamed[i] != 0:
                 index = i
     if code == FINE and flying:
-        code, index = _out_of_range(g)
+        axis = _unexplained(g)
+        if axis >= 0:
+            code, index = MOTORS, axis
+        else:
+            code, index = _out_of_range(g)
     g.past[1], g.past[0] = g.past[0], g.believed
     g.samples = g.samples + 1 if math.isfinite(np.sum(g.position)) else 0
     return code, index
@@ -163,6 +184,7 @@ class Guard:
             gap_upper=fault.gap_upper,
             soft_lower=fault.lower,
             soft_upper=fault.upper,
+            max_unexplained=fault.unexplained,
             at_once=[float(board != 0) for board in parameters.encoder.board],
         )
 

@@ -29,6 +29,7 @@ class GuardArrays(ObserverArrays):
     gap_upper: float  # [m]
     soft_lower: Annotated[FloatArray, 5]  # y, x, z, phi, theta [m, rad]
     soft_upper: Annotated[FloatArray, 5]
+    max_unexplained: Annotated[FloatArray, 5]  # [m/s², rad/s²]
     at_once: Annotated[FloatArray, 6]  # 1 where an encoder is read at once, 0: at the tick
 
     trust: Annotated[NDArray[np.int8], 6]  # SOUND, PUT_RIGHT, LOST or NOISY
@@ -37,6 +38,7 @@ class GuardArrays(ObserverArrays):
     blamed: Annotated[NDArray[np.int8], 6]  # found wrong in this sample
     samples: int  # seen
     contradictions: int  # samples in a row with too large a residual
+    unexplained: Annotated[NDArray[np.int64], 5]  # samples in a row with too large a disturbance
     residual: float  # g1 + g3 - g2 - g4 as it is read [m]
     believed: Annotated[FloatArray, 6]  # lengths, put right or by the observer
     past: Annotated[FloatArray, 2, 6]  # believed lengths of the last sample and the one before

@@ -38,6 +38,8 @@ _CARRY = np.array([0.0, -2.0, 2.0, -1.0, 1.0])
 x and z come first: along them the platen runs off to a stop 50 mm away, in a tilt to one 2 mm away.
 """
 
+_PATIENCE = 2.0  # times as far x and z may be off their way where a cut would throw it up
+_TILT = 0.95  # share of the attraction that tilts may take there
 _BRAKING_UPWARD = 0.1  # of y [s]
 _FREE_STEP = 1e-4  # of the motion without current [s]
 _LONGEST_FALL = 10.0  # [s]
@@ -65,6 +67,7 @@ class LandingArrays(Record):
     settle_time: float  # [s]
     aim: float  # of the descent [m]
     period: float  # [s]
+    balance: float  # air gap below which the magnets pull it up [m]
     stray: Annotated[FloatArray, 5]  # farther from it the platen is not held any more [m, rad]
     astray: bool  # it is, a result
     direct: Annotated[FloatArray, 4]  # i_d of motors 1..4 [A], the result
@@ -84,6 +87,7 @@ def land(block: Block, position: FloatArray, rate: FloatArray, disturbance: Floa
     landing.elapsed += landing.period
     time = landing.elapsed
     wanted = np.empty(5)
+    thrown_up = position[0] < landing.balance  # by a cut
     for axis in range(5):
         left, velocity, acceleration = quintic_to_zero(
             landing.offset[axis], landing.speed[axis], 0.0, landing.braking[axis], time
@@ -98,7 +102,8 @@ def land(block: Block, position: FloatArray, rate: FloatArray, disturbance: Floa
                 time - landing.descent_start,
             )
             target = landing.aim + left
-        if abs(target - position[axis]) > landing.stray[axis]:
+        patience = _PATIENCE if _ACROSS[axis] and thrown_up else 1.0
+        if abs(target - position[axis]) > patience * landing.stray[axis]:
             landing.astray = True
         wanted[axis] = (
             acceleration
@@ -109,9 +114,10 @@ def land(block: Block, position: FloatArray, rate: FloatArray, disturbance: Floa
             wanted[axis] -= disturbance[axis]
         elif abs(target - position[axis]) < _PLACE and abs(velocity) + abs(rate[axis]) < _REST:
             wanted[axis] = 0.0
+    tilt = _TILT if thrown_up else 0.5
     exact_inverse(
         machine_from_array(landing.machine),
-        CurrentLimits(landing.current_limit, 1.0, LEAST_ATTRACTION, landing.along_z, 0.5),
+        CurrentLimits(landing.current_limit, 1.0, LEAST_ATTRACTION, landing.along_z, tilt),
         np.ones(5),
         position,
         wanted,
@@ -137,6 +143,7 @@ class Landing:
             settle_time=landing.settle_time,
             aim=machine.gap_max + landing.depth,
             stray=landing.stray,
+            balance=_balance(parameters),
             period=parameters.sample_time,
         )
 
@@ -180,6 +187,20 @@ class Landing:
     def step(self, position: FloatArray, rate: FloatArray, disturbance: FloatArray) -> bool:
         """Compute the currents of the next sample; true when the landing is over."""
         return land(self.arrays.block, position, rate, disturbance)
+
+
+def _balance(parameters: BridgeParameters) -> float:
+    """Air gap at which the magnets just carry the platen [m]; a stop where there is none."""
+    machine = machine_constants(parameters.machine)
+    low, high = parameters.machine.gap_min, parameters.machine.gap_max
+    zero = np.zeros(4)
+    while high - low > 1e-6:
+        middle = 0.5 * (low + high)
+        if output_accelerations(machine, middle, 0.0, 0.0, zero, zero)[0] < 0.0:
+            low = middle
+        else:
+            high = middle
+    return low
 
 
 @compiled

@@ -94,6 +94,14 @@ class FaultParameters:
         within=(0.0, 1000.0),
         length=5,
     )
+    unexplained: tuple[float, ...] = parameter(
+        (6.0, 6.0, 6.0, 10.0, 10.0),
+        'acceleration that what is commanded does not explain; more for 10 ms in flight is a fault '
+        'of the motors' + _BY_AXIS,
+        unit='m/s^2, rad/s^2',
+        within=(0.0, 1000.0),
+        length=5,
+    )
     lower: tuple[float, ...] = parameter(
         (0.0183, -0.048, -0.048, -0.0028, -0.0135),
         'least position in flight' + _BY_AXIS,

@@ -325,6 +325,8 @@ class BridgeStage(StageLife):
             if self.mode is Mode.LANDING:  # is on its way out of there
                 return
             self._raise_fault('range', *faults.range_fault(code, index, self.guard))
+        elif code == guard.MOTORS:
+            self._raise_fault('current', *faults.motor_fault(index, self.guard))
         else:
             reason, remedy = faults.encoder_fault(code, self.guard)
             blind = self.guard.blind
