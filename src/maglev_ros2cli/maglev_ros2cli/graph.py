@@ -22,6 +22,9 @@ QUIET = 0.15
 """Discovery ends when every participant of this machine is seen and nothing new comes so long [s].
 """
 
+NEEDED_QUIET = 1.0
+"""The same where something is asked for by its name and is not there yet [s]."""
+
 ABROAD_WAIT, MOST_WAIT = 1.0, 5.0
 """It takes at least so long where other machines may take part, and at most so long [s]."""
 
@@ -129,6 +132,7 @@ def discover(
     The wait ends as soon as what is ``needed`` is there. Returns whether it is.
     """
     start = changed = time.monotonic()
+    quiet = QUIET if needed is None else NEEDED_QUIET
     seen: object = None
     while True:
         now = time.monotonic()
@@ -140,7 +144,7 @@ def discover(
         if spin_time is not None:
             over = now - start >= spin_time
         else:
-            known = now - changed >= QUIET and _complete(own, now - start)
+            known = now - changed >= quiet and _complete(own, now - start)
             over = known or now - start >= MOST_WAIT
         if over:
             return needed is None
