@@ -273,6 +273,19 @@ def test_a_bridge_that_catches_up_knows_how_the_platen_moves(late: int) -> None:
         landed(flight)
 
 
+def test_a_landing_goes_on_while_samples_come_late() -> None:
+    """Every third one, within the bound: it must not begin anew with each."""
+    flight = airborne()
+    flight.stage.land('asked to')
+    for k in range(2000):
+        if k % 3 == 0:
+            flight.boards.delay(1)
+        flight.run(1, controlled=False)
+    assert flight.stage.late_ticks > 500
+    assert flight.stage.mode is Mode.DISABLED
+    assert flight.rig.impact <= SOFT
+
+
 @pytest.mark.parametrize('phase', range(12))
 def test_a_dead_phase_near_the_magnets_is_found_and_landed(phase: int) -> None:
     """Before the tilt that it leaves uncontrolled has gone too far to be undone."""

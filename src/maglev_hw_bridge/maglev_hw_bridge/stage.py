@@ -53,7 +53,8 @@ class BridgeStage(StageLife):
         self._knock = Knock(self.parameters)
         self._zero = np.zeros(4)
         self._flowed = np.zeros(12)  # phase currents until the sample read last [A]
-        self._behind = self._behind_before = 0  # samples that this one, and the last, was late by
+        self._behind = 0  # samples that this one was late by
+        self._to_catch_up = 0  # late samples still to come when the landing began
         self._lower_stop = self.parameters.machine.gap_max
         self._stale_samples = round(self.parameters.fault.stale / self.sample_time)
         self._longest_stop = round(self.parameters.boards.stop_time / self.sample_time)
@@ -136,7 +137,6 @@ class BridgeStage(StageLife):
         """
         if self._behind == 0 or not self.flying:
             self._flowed[:] = self.amplifiers.arrays.current
-        self._behind_before = self._behind
         self._behind = int(self.driver.late / self.sample_time + _ROUNDING)
 
     def write(self, direct_current: Any, quadrature_current: Any, age: int = 0) -> None:
@@ -258,7 +258,8 @@ class BridgeStage(StageLife):
     def _descend(self) -> None:
         state = self.guard.arrays
         self._landing_samples += 1
-        if self._behind < self._behind_before:  # it went on as before while we caught up
+        if self._to_catch_up > 0:  # until then the platen has gone on as before
+            self._to_catch_up -= 1
             self.landing.begin(state.position, state.rate, self.guard.blind)
         stopping = self.fault is not None and self.fault.kind == 'stop'
         too_long = stopping and self._landing_samples > self._longest_stop
@@ -312,6 +313,7 @@ class BridgeStage(StageLife):
             self._disable()
             return
         self.mode, self._landing_samples = Mode.LANDING, 0
+        self._to_catch_up = self._behind
         self.landing.begin(state.position, state.rate, blind)
 
     def _falls_softly(self) -> bool:
