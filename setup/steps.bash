@@ -257,16 +257,20 @@ in_environment() {
 }
 
 # Fill the caches of compiled functions and modules, so that the first run starts as quickly as the
-# second. Only that depends on it, so a defect of the code is left for a run or the tests to show.
+# second. In two processes, the plant first in one and last in the other, so that what both need is
+# compiled once. Only speed depends on it: a defect of the code is left for a run or the tests.
 warm_up() {
-  in_environment python -c 'import maglev_hw_bridge.node as bridge
+  in_environment python -c 'import maglev_controller.node, maglev_hw_bridge.node as bridge
+from maglev_controller.parameters import ControllerParameters
+from maglev_controller.supervision import Supervisor
 from maglev_model.parameters import build
+Supervisor(ControllerParameters())
 stage = bridge.BridgeStage.ready(build(bridge.BridgeParameters, {"homing.at_start": True}))
 stage.read()
 stage.hold()
 stage.close()' &
   in_environment python -c 'import maglev_study.closed_loop as loop
-import maglev_controller.node, maglev_plant.node, maglev_reference.node
+import maglev_plant.node, maglev_reference.node
 import maglev_monitor.bag.recorder, maglev_monitor.live.node, maglev_monitor.report.run_report
 import maglev_view.forces, maglev_view.node, numpy
 from maglev_model.machine import MachineParameters

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Generator
 
 import pytest
@@ -13,6 +14,9 @@ from witness import Witness
 settings.register_profile('loaded', suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile('loaded')
 
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as a script's background jobs have it
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
 _late = ''  # that the machine does not keep time, and where that was found out
 
 _worker = os.environ.get('PYTEST_XDIST_WORKER', 'gw0').removeprefix('gw')
@@ -22,10 +26,11 @@ if _domains:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Scenarios first, then the other tests with real nodes, which all take their time."""
+    """The two longest files first, then the other tests with real nodes, which take their time."""
 
     def place(item: pytest.Item) -> tuple[bool, bool]:
-        return item.path.name != 'test_scenarios.py', item.path.parent.name != 'graph'
+        longest = item.path.name in ('test_scenarios.py', 'test_campaign.py')
+        return not longest, item.path.parent.name != 'graph'
 
     items.sort(key=place)
 

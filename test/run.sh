@@ -13,15 +13,15 @@ MAGLEV_SETUP=test . "$root/setup.sh"
 take_domain() {
   local locks=${XDG_RUNTIME_DIR:-/tmp}/maglev-domains-$UID number
   mkdir -p -- "$locks"
-  for number in $(shuf -i 1-33); do
+  for number in $(shuf -i 1-25); do
     exec 8>"$locks/$number"
     if flock -n 8; then
       export ROS_DOMAIN_ID=$number
-      export MAGLEV_TEST_DOMAINS="$number $((number + 33)) $((number + 66))"
+      export MAGLEV_TEST_DOMAINS="$number $((number + 25)) $((number + 50)) $((number + 75))"
       return
     fi
   done
-  echo 'test: all ROS domains 1 to 99 are taken by other test runs' >&2
+  echo 'test: all ROS domains 1 to 100 are taken by other test runs' >&2
   exit 1
 }
 
@@ -117,10 +117,10 @@ code=0
 if (($#)); then
   run_pytest "$@" || code=$?
 else
-  # Three files at a time, for those with real nodes wait often, and a flight in lockstep bears what
+  # Four files at a time, for those with real nodes wait often, and a flight in lockstep bears what
   # the others take; then, with the machine to themselves, those that fly in real time.
   asked=${MAGLEV_LONG:+ or long}
-  run_pytest -p xdist -n 3 --dist loadfile --no-loadscope-reorder \
+  run_pytest -p xdist -n 4 --dist loadfile --no-loadscope-reorder \
     -m "not alone and (not long$asked)" || code=$?
   run_pytest -m "alone and (not long$asked)" test/graph test/model test/scenario test/study || code=$?
 fi
