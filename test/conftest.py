@@ -26,11 +26,10 @@ if _domains:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """The two longest files first, then the other tests with real nodes, which take their time."""
+    """Scenarios first, then the other tests with real nodes, which all take their time."""
 
     def place(item: pytest.Item) -> tuple[bool, bool]:
-        longest = item.path.name in ('test_scenarios.py', 'test_campaign.py')
-        return not longest, item.path.parent.name != 'graph'
+        return item.path.name != 'test_scenarios.py', item.path.parent.name != 'graph'
 
     items.sort(key=place)
 

@@ -10,6 +10,7 @@ import subprocess
 import time
 from collections.abc import Callable, Iterable, Sequence
 from functools import cache
+from multiprocessing import forkserver
 from pathlib import Path
 from typing import Any
 
@@ -121,7 +122,11 @@ class ForkedProcess(Process):
 def _forks() -> Any:
     """A server that starts processes; it has one thread, as what forks must."""
     context = multiprocessing.get_context('forkserver')
-    context.set_forkserver_preload(list(_IMPORTED_BY_NODES))
+    context.set_forkserver_preload([*_IMPORTED_BY_NODES, 'ready'])
+    given = os.environ.get('PYTHONPATH', '')
+    os.environ['PYTHONPATH'] = f'{ROOT / "test" / "support"}:{given}'  # or it would not find ours
+    forkserver.ensure_running()
+    os.environ['PYTHONPATH'] = given
     return context
 
 

@@ -81,12 +81,12 @@ class ControllerWatch:
         self.gave_up = known and status == Status.GAVE_UP
         self.why = self._disorder(sequence, status, stamped, sample)
         resting = status == Status.RESTING
-        currents = bool(np.any(direct_current) or np.any(quadrature_current))
-        if resting and currents and not self.why:
+        asks = resting and bool(np.any(direct_current) or np.any(quadrature_current))
+        if asks and not self.why:
             self.why = 'currents came from a controller that says it rests'
         if flying:
             stranger = self.taken_up and not known and session != NOBODY
-            if stranger and resting and not currents and not stamped:
+            if stranger and resting and not asks and not stamped:
                 self.why = 'a controller that rests answers another stage'
                 return Verdict.ELSEWHERE
             return self._in_flight(known, sequence)

@@ -8,10 +8,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from maglev_study.faults.campaign import Campaign, Outcome
 from maglev_study.faults.draw import cells, from_json, scenario
 from maglev_study.faults.fly import Scenario
 from maglev_study.faults.page import describe, describe_violations
+
+_PROCESSES = 2
 
 
 def listed(name: str) -> Any:
@@ -28,7 +32,7 @@ OPEN = {one['seed']: set(one['rules']) for one in listed('open.json')}
 def failures(runs: Sequence[Scenario]) -> dict[int, str]:
     """Fly them, and tell of those that break a rule that is not open, by seed."""
     outcomes: list[Outcome] = []
-    with Campaign(2) as campaign:
+    with Campaign(_PROCESSES) as campaign:
         campaign.fly(sorted(runs, key=lambda run: run.machine), outcomes.extend)
     assert len(outcomes) == len(runs)
     return {
@@ -38,6 +42,7 @@ def failures(runs: Sequence[Scenario]) -> dict[int, str]:
     }
 
 
+@pytest.mark.alone
 def test_cells_of_fault_and_phase_and_what_was_mended_keep_the_rules() -> None:
     step = 1 if 'MAGLEV_ALL_CELLS' in os.environ else 3  # all take a minute more on two cores
     runs = {run.seed: run for run in [*map(scenario, range(0, len(cells()), step)), *FOUND]}
