@@ -8,7 +8,8 @@ by the clock and with the limits of real boards: currents 5 ms old, a sample 5 m
 of 20 ms. At some instant between rest and rest one of them gets what its seed says. Looked at are
 the platen's true speed where it meets a stop, that no current stays, that all that live end in
 order when asked to, and that the next run starts. Runs in which the machine itself was late, by a
-thread of the highest priority, are counted apart. Exits with 1 when another broke a rule.
+thread of the highest priority or by a watchdog that expired with nothing done to the bridge, are
+counted apart. Exits with 1 when another broke a rule.
 """
 
 from __future__ import annotations
@@ -184,12 +185,13 @@ def fly(run: Run) -> dict[str, object]:
         if speed > DEGRADED and not run.cut:
             wrong.append(f'met a stop at {speed:.3f} m/s')
         said = {process.log.stem: process.output[-2000:] for process in nodes.started}
+        expired = not run.cut and any('watchdog expired' in output for output in said.values())
     return {
         **run._asdict(),
         'gap': None if before is None else float(before.state[0]),
         'speed': speed,
         'late': witness.worst,
-        'disturbed': witness.disturbed,
+        'disturbed': witness.disturbed or expired,
         'wrong': wrong,
         'said': said if wrong else {},
     }
@@ -211,7 +213,7 @@ def main() -> int:
             with asked.out.open('a', encoding='utf-8') as file:
                 file.write(json.dumps(one) + '\n')
         if one['wrong']:
-            late = f', while the machine was late by {one["late"]:.3f} s' * bool(one['disturbed'])
+            late = ', on a machine that was late' * bool(one['disturbed'])
             told = f'{one["target"]}, {one["what"]} after {one["instant"]:.2f} s'
             print(f'seed {seed}: {told}: {"; ".join(one["wrong"])}{late}', flush=True)  # type: ignore[arg-type]
     tell(outcomes, time.monotonic() - begun)
