@@ -14,20 +14,20 @@ import math
 from typing import Final
 
 from maglev_controller.control_arrays import Reading, Record
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing
 from maglev_model.machine import Machine
 
 DOUBT: Final = 0.7
 """Share of a difference within the count that is not believed at rest."""
 
 
-@compiled
+@borrowing
 def _believed(difference: float, half: float, doubt: float) -> float:
     """Reading less prediction, ``half`` a count, with what is not believed taken off."""
     return difference - doubt * min(max(difference, -half), half)
 
 
-@compiled
+@borrowing
 def surprises(settings: Record, machine: Machine, axes: Record, reading: Reading) -> None:
     """What the encoders read beyond what the observers predicted, by axis, into their records."""
     half, level = settings.half_gap, axes[0].estimated_position
@@ -51,7 +51,7 @@ def surprises(settings: Record, machine: Machine, axes: Record, reading: Reading
         axes[index].surprise = _believed(difference, half, doubt)
 
 
-@compiled
+@borrowing
 def observe(settings: Record, axis: Record, index: int) -> tuple[float, float]:
     """Position and velocity when w acts: the prediction, corrected by what surprises it."""
     axis.estimated_position += settings.observer_position[index] * axis.surprise
@@ -64,7 +64,7 @@ def observe(settings: Record, axis: Record, index: int) -> tuple[float, float]:
     return position, velocity
 
 
-@compiled
+@borrowing
 def predict(settings: Record, axis: Record, realised: float) -> None:
     """Carry the estimate over to the next sample, its input known."""
     acceleration = realised

@@ -13,7 +13,7 @@ import numpy as np
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_model.axes import AXES, UNITS, FloatArray
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing
 from maglev_model.records import Block, Record
 
 
@@ -31,7 +31,7 @@ class FollowingArrays(Record):
     begun: bool
 
 
-@compiled
+@borrowing
 def _follow(block: Block, position: FloatArray, velocity: FloatArray, error: FloatArray) -> int:
     """The first axis with too large an error, for too long, or -1."""
     f: FollowingArrays = block[0]

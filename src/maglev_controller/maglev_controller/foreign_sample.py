@@ -25,7 +25,7 @@ from maglev_controller.sample_step import (
 )
 from maglev_controller.voltage import keep_within_voltage
 from maglev_model.axes import FloatArray
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing, compiled
 from maglev_model.inverse import CURRENT, clip
 from maglev_model.machine_array import machine_from_array
 from maglev_model.platen import output_accelerations
@@ -35,7 +35,7 @@ TOLD = 5
 its acceleration, (5,) each."""
 
 
-@compiled
+@borrowing
 def open_sample(
     records: NDArray[np.void],
     models: NDArray[np.void],
@@ -70,7 +70,7 @@ def open_sample(
     return OK
 
 
-@compiled
+@borrowing
 def close_by_itself(
     records: NDArray[np.void],
     models: NDArray[np.void],
@@ -111,7 +111,7 @@ def close_with_input(
     return limited_by
 
 
-@compiled
+@borrowing
 def _within_amplitude(limit: float, direct: FloatArray, quadrature: FloatArray) -> int:
     """Limit each motor's amplitude; i_q yields to the i_d that carries the platen."""
     limited_by = 0

@@ -14,10 +14,10 @@ from __future__ import annotations
 import math
 
 from maglev_controller.control_arrays import Record
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing
 
 
-@compiled
+@borrowing
 def friction_ahead(settings: Record, axis: Record, index: int) -> float:
     """What friction is going to take at this sample [m/s², rad/s²]; moves its shape on."""
     if settings.friction_gain == 0.0:
@@ -29,7 +29,7 @@ def friction_ahead(settings: Record, axis: Record, index: int) -> float:
     return float(axis.friction * axis.bristle)
 
 
-@compiled
+@borrowing
 def learn_friction(settings: Record, axis: Record, index: int, realised: float) -> None:
     """Take what was ``realised`` of w at this sample into the level."""
     following = abs(axis.error) < settings.learned_error[index]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from maglev_controller.control_arrays import ControlArrays, Record
 from maglev_model.axes import FloatArray
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing, compiled
 
 IDLE: Final = 0
 """Nothing is learned; what was learned is fed forward."""
@@ -79,7 +79,7 @@ NO_LEARNING: Final = LearningArrays(
 """For compiled loops in which nothing is learned."""
 
 
-@compiled
+@borrowing
 def look_ahead(learning: LearningArrays, control: ControlArrays, follows: bool) -> None:
     """Tell the law what is to be fed forward at the sample that comes.
 
@@ -116,7 +116,7 @@ def _write_next(learning: LearningArrays, place: int) -> None:
         learning.tables[state.next, place, axis] = min(max(value, -limit), limit)
 
 
-@compiled
+@borrowing
 def _grown(state: Record) -> bool:
     for axis in range(5):
         if state.sum[axis] > max(state.growth * state.least[axis], state.floor[axis]):
@@ -124,13 +124,13 @@ def _grown(state: Record) -> bool:
     return False
 
 
-@compiled
+@borrowing
 def _end(state: Record, stage: int) -> None:
     """Go back to the best."""
     state.used, state.stage = state.best, stage
 
 
-@compiled
+@borrowing
 def _judge(learning: LearningArrays) -> None:
     """A pass is over: keep its table when it is the best, and go on with the next."""
     state = learning.state[0]
@@ -154,7 +154,7 @@ def _judge(learning: LearningArrays) -> None:
         state.next += 1
 
 
-@compiled
+@borrowing
 def _record(learning: LearningArrays, control: ControlArrays, row: int) -> None:
     """What the law has made beyond reference and friction at this sample, and the error."""
     state, records = learning.state[0], control.records[0]
@@ -167,7 +167,7 @@ def _record(learning: LearningArrays, control: ControlArrays, row: int) -> None:
         state.sum[axis] += error * error
 
 
-@compiled
+@borrowing
 def learn(learning: LearningArrays, control: ControlArrays) -> None:
     """Take what the law has made of this sample into account; moves on to the next.
 

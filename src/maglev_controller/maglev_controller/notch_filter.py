@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from maglev_controller.control_arrays import Record
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing
 
 
-@compiled
+@borrowing
 def notched(settings: Record, axis: Record, index: int, value: float) -> float:
     """``value`` after all notches of an axis; moves their states on."""
     for k in range(settings.notches[index]):

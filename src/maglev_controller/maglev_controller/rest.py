@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Final
 
 from maglev_controller.control_arrays import Record
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing
 
 CREEP: Final = 1e-5
 """A reference slower than this rests [m/s, rad/s]."""
@@ -22,7 +22,7 @@ FADING_TIME: Final = 0.05
 """Time constant of letting go and of waking up [s]."""
 
 
-@compiled
+@borrowing
 def note_motion(settings: Record, axis: Record, position: float, velocity: float) -> None:
     """Move ``awake`` on; ``position`` and ``velocity`` of the reference at this sample.
 
@@ -37,7 +37,7 @@ def note_motion(settings: Record, axis: Record, position: float, velocity: float
     axis.awake += settings.waking * (goal - axis.awake)
 
 
-@compiled
+@borrowing
 def shares(settings: Record, axis: Record) -> tuple[float, float]:
     """Of the error, what oscillators learn from; of their states, what is kept."""
     if not settings.rest_fades:

@@ -26,7 +26,7 @@ from maglev_controller.notch_filter import notched
 from maglev_controller.rest import note_motion, shares
 from maglev_controller.voltage import keep_within_voltage
 from maglev_model.axes import FloatArray
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing, compiled
 from maglev_model.equilibrium import equilibrium_inverse
 from maglev_model.inverse import (
     CURRENT,
@@ -57,7 +57,7 @@ OUT_OF_RANGE: Final = 6
 BAD_REFERENCE: Final = 7
 
 
-@compiled
+@borrowing
 def _check(settings: Record, output: FloatArray, warp: float, reference: Reference) -> int:
     """Whether outputs and reference can be used: a fault code, or 0."""
     size = 0.0
@@ -79,7 +79,7 @@ def _check(settings: Record, output: FloatArray, warp: float, reference: Referen
     return OK
 
 
-@compiled
+@borrowing
 def _follow_jump(
     settings: Record, axis: Record, index: int, jump: float
 ) -> tuple[float, float, float]:
@@ -108,7 +108,7 @@ def _follow_jump(
     return position, velocity, acceleration
 
 
-@compiled
+@borrowing
 def model_parts(control: ControlArrays, sample: Record) -> None:
     """What the internal models of all axes add to w: κ ξ."""
     for index in range(5):
@@ -118,7 +118,7 @@ def model_parts(control: ControlArrays, sample: Record) -> None:
         sample.internal_model[index] = part
 
 
-@compiled
+@borrowing
 def _virtual_input(
     settings: Record,
     sample: Record,
@@ -178,7 +178,7 @@ def _virtual_input(
         sample.virtual_input[index] += axis.learned
 
 
-@compiled
+@borrowing
 def _currents(
     settings: Record, machine: Machine, sample: Record, direct: FloatArray, quadrature: FloatArray
 ) -> int:
@@ -195,7 +195,7 @@ def _currents(
     return equilibrium_inverse(machine, limits, controlled, settings.equilibrium, wanted, answer)
 
 
-@compiled
+@borrowing
 def _lost(settings: Record, sample: Record, index: int) -> float:
     """What was realised less what was wanted: of w, or of the currents u_x and u_z as in (17)."""
     if not settings.paper_antiwindup:
@@ -206,10 +206,16 @@ def _lost(settings: Record, sample: Record, index: int) -> float:
 @compiled
 def advance_models(control: ControlArrays, settings: Record, sample: Record) -> None:
     """ξ⁺ = Φ_d ξ + N_d e + E_d (what was realised less what was wanted), (14), (17)."""
+    _advance_models(control, settings, sample, np.empty(control.xi.shape[1]))
+
+
+@borrowing
+def _advance_models(
+    control: ControlArrays, settings: Record, sample: Record, following: FloatArray
+) -> None:
     models, transition, xi = control.models, control.transition, control.xi
     axes = control.records[0].axes
     states = xi.shape[1]
-    following = np.empty(states)
     for index in range(5):
         if settings.controlled[index] == 0.0:
             continue
@@ -226,7 +232,7 @@ def advance_models(control: ControlArrays, settings: Record, sample: Record) -> 
             xi[index, row] = following[row]
 
 
-@compiled
+@borrowing
 def measure(
     settings: Record, machine: Machine, sample: Record, reading: Reading, reference: Reference
 ) -> int:
@@ -240,7 +246,7 @@ def measure(
     return _check(settings, output, warp, reference)
 
 
-@compiled
+@borrowing
 def virtual_inputs(settings: Record, sample: Record, axes: Record, reference: Reference) -> None:
     """w of all axes; internal models and what surprises the observers are known."""
     for index in range(5):
@@ -256,7 +262,7 @@ def virtual_inputs(settings: Record, sample: Record, axes: Record, reference: Re
         )
 
 
-@compiled
+@borrowing
 def currents_of_w(
     settings: Record, machine: Machine, sample: Record, axes: Record, currents: Currents
 ) -> int:
@@ -264,13 +270,14 @@ def currents_of_w(
     direct, quadrature = currents.direct, currents.quadrature
     limited_by = _currents(settings, machine, sample, direct, quadrature)
     if limited_by == 0:
-        sample.realised[:] = sample.virtual_input
+        for index in range(5):
+            sample.realised[index] = sample.virtual_input[index]
     if keep_within_voltage(settings, machine, sample, axes, direct, quadrature):
         limited_by |= CURRENT
     return limited_by
 
 
-@compiled
+@borrowing
 def learn(settings: Record, sample: Record, axes: Record) -> None:
     """Take what is realised at the sample into observers and friction."""
     for index in range(5):
@@ -279,7 +286,7 @@ def learn(settings: Record, sample: Record, axes: Record) -> None:
         learn_friction(settings, axes[index], index, sample.realised[index])
 
 
-@compiled
+@borrowing
 def control_step(
     control: ControlArrays, reading: Reading, reference: Reference, currents: Currents
 ) -> int:
@@ -302,7 +309,7 @@ def control_step(
     return limited_by
 
 
-@compiled
+@borrowing
 def answer_sample(
     records: NDArray[np.void],
     models: NDArray[np.void],

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from maglev_controller.control_arrays import INTERVALS, Record
 from maglev_model.axes import FloatArray
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing, compiled
 from maglev_model.machine import Machine, machine_constants
 from maglev_model.motor import force_coefficients
 from maglev_model.platen import gaps_from_outputs, output_accelerations
@@ -51,7 +51,7 @@ def winding_settings(parameters: ControllerParameters) -> dict[str, ArrayLike]:
     }
 
 
-@compiled
+@borrowing
 def _inductance(winding: Record, gap: float) -> tuple[float, float]:
     """L [H] and its slope [H/m] at an air gap."""
     place = (gap - winding.least_gap) / winding.spacing
@@ -60,7 +60,7 @@ def _inductance(winding: Record, gap: float) -> tuple[float, float]:
     return winding.inductance[k] + (place - k) * rise, rise / winding.spacing
 
 
-@compiled
+@borrowing
 def _share(voltage: float, free_d: float, free_q: float, step_d: float, step_q: float) -> float:
     """Largest share, 0 to 1, of a step's voltages that with the free ones is within the rail."""
     square = step_d * step_d + step_q * step_q
@@ -89,10 +89,23 @@ def keep_within_voltage(
 
     True when one was; ``realised`` of the sample is then what all currents make.
     """
-    winding, before = settings.winding, sample.asked
-    if not winding.limits:
-        return False
-    gap, shortened = np.empty(4), False
+    return settings.winding.limits and _keep_within(
+        settings, machine, sample, axes, direct, quadrature, np.empty(4)
+    )
+
+
+@borrowing
+def _keep_within(
+    settings: Record,
+    machine: Machine,
+    sample: Record,
+    axes: Record,
+    direct: FloatArray,
+    quadrature: FloatArray,
+    gap: FloatArray,
+) -> bool:
+    """As :func:`keep_within_voltage`, with room for the gaps (4,)."""
+    winding, before, shortened = settings.winding, sample.asked, False
     gaps_from_outputs(machine, sample.position, gap)
     rate = axes[0].smooth_velocity
     tilt_phi = machine.r * axes[3].smooth_velocity

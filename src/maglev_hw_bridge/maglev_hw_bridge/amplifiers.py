@@ -15,7 +15,7 @@ import numpy as np
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_model.axes import FloatArray
 from maglev_model.commutation import SCALES, phase_currents
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing, compiled
 from maglev_model.records import Block, Record
 
 # What drive() returns.
@@ -50,7 +50,7 @@ class AmplifierArrays(Record):
     volts: Annotated[FloatArray, 12]  # put out [V]
 
 
-@compiled
+@borrowing
 def _limit(amplifier: AmplifierArrays, load: float) -> float:
     """Largest current [A] a phase may carry at its I²t load."""
     peak, continuous = amplifier.peak, amplifier.continuous
@@ -60,7 +60,7 @@ def _limit(amplifier: AmplifierArrays, load: float) -> float:
     return peak + way * (continuous - peak)
 
 
-@compiled
+@borrowing
 def _put_out(amplifier: AmplifierArrays) -> bool:
     """Bring the wanted currents within all limits and to volts; whether a budget is spent."""
     slew_step, voltage_range = amplifier.slew_step, amplifier.voltage_range
@@ -89,7 +89,7 @@ def _drive_phases(block: Block, current: FloatArray) -> None:
     _put_out(amplifier)
 
 
-@compiled
+@borrowing
 def drive(block: Block, i_d: FloatArray, i_q: FloatArray, x: float, z: float) -> tuple[int, int]:
     """Turn ``i_d``, ``i_q`` of motors 1..4 [A] at ``x``, ``z`` [m] into ``volts``.
 

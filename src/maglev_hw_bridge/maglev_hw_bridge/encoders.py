@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES
 from maglev_model.axes import FloatArray
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing
 from maglev_model.records import Block, Record
 
 CountArray = NDArray[np.int32]
@@ -33,7 +33,7 @@ class EncoderArrays(Record):
     length: Annotated[FloatArray, 6]  # [m], the result
 
 
-@compiled
+@borrowing
 def decode(block: Block, counts: CountArray) -> None:
     """Follow ``counts`` (6,) over roll-overs of the 32-bit counters and write ``length`` [m]."""
     encoder: EncoderArrays = block[0]

@@ -31,7 +31,7 @@ from maglev_hw_bridge.standing_still import (
     lose,
 )
 from maglev_model.axes import FloatArray, Y
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing, compiled
 from maglev_model.records import Block
 
 # What watch() returns.
@@ -48,7 +48,7 @@ _UNEXPLAINED_SAMPLES = 10
 _BEGUN = 2  # samples for position and rate
 
 
-@compiled
+@borrowing
 def _out_of_range(g: GuardArrays) -> tuple[int, int]:
     for axis in range(5):
         if not g.soft_lower[axis] <= g.position[axis] <= g.soft_upper[axis]:
@@ -59,7 +59,7 @@ def _out_of_range(g: GuardArrays) -> tuple[int, int]:
     return FINE, 0
 
 
-@compiled
+@borrowing
 def _contradiction(g: GuardArrays) -> bool:
     """Whether four gaps that are believed cannot be those of a rigid platen."""
     for i in range(4):
@@ -69,7 +69,7 @@ def _contradiction(g: GuardArrays) -> bool:
     return bool(g.contradictions >= _RESIDUAL_SAMPLES)
 
 
-@compiled
+@borrowing
 def _unexplained(g: GuardArrays) -> int:
     """The axis that sound encoders show to move otherwise than commanded, or -1."""
     seen = not observer.supported(g, Y) and g.samples >= SETTLING
@@ -158,7 +158,7 @@ def watch(
     return code, index
 
 
-@compiled
+@borrowing
 def _lose(block: Block, encoder: int) -> None:
     """See :meth:`Guard.lose`."""
     g: GuardArrays = block[0]

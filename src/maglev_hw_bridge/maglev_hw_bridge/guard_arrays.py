@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from maglev_hw_bridge.observer import ObserverArrays
 from maglev_model.axes import FloatArray
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing
 
 # What an encoder is.
 SOUND: Final = 0
@@ -55,7 +55,7 @@ class GuardArrays(ObserverArrays):
     left: Annotated[FloatArray, 4]  # and by how much, leaps aside [m]
 
 
-@compiled
+@borrowing
 def gap_residual(length: FloatArray) -> float:
     """``g1 + g3 - g2 - g4``, which is 0 for a rigid platen [m]."""
     return float(length[0] + length[2] - length[1] - length[3])

@@ -6,7 +6,7 @@ from typing import Final
 
 from maglev_hw_bridge.guard_arrays import LOST, NOISY, PUT_RIGHT, SOUND, GuardArrays
 from maglev_model.axes import PHI, THETA, Y
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing
 from maglev_model.machine_array import machine_from_array
 
 PROBATION: Final = 20
@@ -16,7 +16,7 @@ _TAMED = 0.2  # how much of what is noisy is believed
 _FAR_OFF = 1.5e-3  # what a noisy one says farther off than this is no news [m]
 
 
-@compiled
+@borrowing
 def _drift(g: GuardArrays, i: int) -> float:
     """How far friction may carry what an encoder should read off the model in probation [m]."""
     if i >= 4:
@@ -29,13 +29,13 @@ def _drift(g: GuardArrays, i: int) -> float:
     return float(0.5 * held * (PROBATION * g.period) ** 2)
 
 
-@compiled
+@borrowing
 def _tame(g: GuardArrays, i: int, error: float) -> None:
     """Believe a little of what is noisy, and nothing where it is far off."""
     g.believed[i] -= (1.0 - _TAMED) * error if abs(error) < _FAR_OFF else error
 
 
-@compiled
+@borrowing
 def _leap(g: GuardArrays, i: int, error: float, step: float) -> None:
     """Put an encoder right that leapt; where it leaps again, do without it.
 
@@ -54,7 +54,7 @@ def _leap(g: GuardArrays, i: int, error: float, step: float) -> None:
         g.trust[i] = LOST
 
 
-@compiled
+@borrowing
 def find_leaps(g: GuardArrays) -> bool:
     """Find and put right what leaps; whether there is some."""
     found = False

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_model.axes import PHI, THETA, FloatArray, X, Y, Z
 from maglev_model.commutation import SCALES, direct_quadrature_currents
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing, compiled
 from maglev_model.machine import machine_constants
 from maglev_model.machine_array import MachineArray, machine_from_array
 from maglev_model.platen import gaps_from_outputs, output_accelerations, outputs_from_gaps
@@ -80,7 +80,7 @@ def observer_fields(parameters: BridgeParameters) -> dict[str, Any]:
     }
 
 
-@compiled
+@borrowing
 def start(o: ObserverArrays, length: FloatArray) -> None:
     """Begin at rest where the encoders (6,) [m] say."""
     machine = machine_from_array(o.machine)
@@ -91,7 +91,7 @@ def start(o: ObserverArrays, length: FloatArray) -> None:
         o.disturbance_then[axis] = o.still_time[axis] = 0.0
 
 
-@compiled
+@borrowing
 def _foretell(o: ObserverArrays) -> None:
     """What the encoders should read where the platen is."""
     gaps_from_outputs(machine_from_array(o.machine), o.position, o.length[:4])
@@ -114,7 +114,7 @@ def _push(o: ObserverArrays, current: FloatArray) -> tuple[float, float, float, 
     )
 
 
-@compiled
+@borrowing
 def supported(o: ObserverArrays, axis: int) -> bool:
     """Whether a stop may hold an axis."""
     near = _SUPPORT if axis < 3 else _TILT_SUPPORT
@@ -122,7 +122,7 @@ def supported(o: ObserverArrays, axis: int) -> bool:
     return bool(room < near)
 
 
-@compiled
+@borrowing
 def _stopped(o: ObserverArrays, axis: int) -> bool:
     """Whether the model would carry an axis into a stop that it is at."""
     end = o.upper[axis] if o.model_rate[axis] > 0.0 else o.lower[axis]
@@ -147,7 +147,7 @@ def predict(o: ObserverArrays, current: FloatArray) -> None:
     o.step[:] = o.length - before
 
 
-@compiled
+@borrowing
 def _carry(o: ObserverArrays, axis: int, push: float, held: float) -> None:
     period = o.period
     acceleration = push + o.disturbance[axis]
@@ -190,7 +190,7 @@ def correct(o: ObserverArrays, length: FloatArray, used: Flags, counted: Flags) 
             o.disturbance_then[axis] = o.disturbance[axis]
 
 
-@compiled
+@borrowing
 def _correct_vertical(o: ObserverArrays, innovation: FloatArray, used: Flags) -> None:
     """Correct y and the tilts by the gaps.
 
@@ -219,7 +219,7 @@ def _correct_vertical(o: ObserverArrays, innovation: FloatArray, used: Flags) ->
         _amend(o, THETA, tilt_x / (along_x * r))
 
 
-@compiled
+@borrowing
 def _told(innovation: float, count: float, counted: bool) -> float:
     """What an encoder tells: one that stands still, only that its count has not changed."""
     if counted:
@@ -227,7 +227,7 @@ def _told(innovation: float, count: float, counted: bool) -> float:
     return math.copysign(max(abs(innovation) - count, 0.0), innovation)
 
 
-@compiled
+@borrowing
 def _amend(o: ObserverArrays, axis: int, error: float) -> None:
     o.position[axis] += o.gain[0] * error
     o.rate[axis] += o.gain[1] * error
@@ -235,7 +235,7 @@ def _amend(o: ObserverArrays, axis: int, error: float) -> None:
         o.disturbance[axis] += o.gain[2] * error
 
 
-@compiled
+@borrowing
 def _coast(o: ObserverArrays, axis: int) -> None:
     """Let friction hold an axis that nothing shows once it has come to rest."""
     before = o.rate[axis] - o.period * o.acceleration[axis]
@@ -243,13 +243,13 @@ def _coast(o: ObserverArrays, axis: int) -> None:
         o.rate[axis] = o.disturbance[axis] = 0.0
 
 
-@compiled
+@borrowing
 def alone(o: ObserverArrays, axis: int) -> None:
     """Take an axis to have moved since its last count as the model alone says."""
     o.rate[axis], o.disturbance[axis] = o.model_rate[axis], o.disturbance_then[axis]
 
 
-@compiled
+@borrowing
 def take_at_its_word(o: ObserverArrays, axis: int, position: float) -> None:
     """Begin anew, at rest, with an axis that was thought to move: its encoder counts after all.
 
@@ -262,7 +262,7 @@ def take_at_its_word(o: ObserverArrays, axis: int, position: float) -> None:
     bound_disturbance(o, axis)
 
 
-@compiled
+@borrowing
 def bound_disturbance(o: ObserverArrays, axis: int) -> None:
     """Of an axis that nothing may show any more only friction is believed, of a tilt nothing."""
     bound = o.friction[axis] if axis < PHI else 0.0

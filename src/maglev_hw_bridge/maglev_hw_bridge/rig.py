@@ -17,7 +17,7 @@ from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.signal_parameters import check_places, check_signs
 from maglev_model.axes import FloatArray
 from maglev_model.commutation import SCALES, direct_quadrature_currents
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing, compiled
 from maglev_model.machine import Machine
 from maglev_model.machine_array import machine_from_array
 from maglev_model.parameters import ParameterError
@@ -56,7 +56,7 @@ class RigArrays(Record):
     impact: float  # greatest speed of a seat that met a vertical stop [m/s]
 
 
-@compiled
+@borrowing
 def _flow(rig: RigArrays, targets: FloatArray) -> None:
     """Carry the phase currents over one step towards their targets (12,) [A]."""
     for i in range(12):
@@ -67,7 +67,7 @@ def _flow(rig: RigArrays, targets: FloatArray) -> None:
         rig.current[i] = min(max(wanted, rest - reach), rest + reach)
 
 
-@compiled
+@borrowing
 def _commute(rig: RigArrays, stage: StageArrays, before: FloatArray) -> None:
     """i_d and i_q of a step, from the mean of the phase currents before and after it."""
     for motor in range(4):
@@ -118,7 +118,7 @@ def _carry(rig: RigArrays, stage: StageArrays, machine: Machine, targets: FloatA
     _commute(rig, stage, before)
 
 
-@compiled
+@borrowing
 def _touching(rig: RigArrays, stage: StageArrays) -> bool:
     """Whether a seat of the platen is at a vertical stop."""
     y, phi, theta = stage.state[0], stage.state[6], stage.state[8]
@@ -148,7 +148,7 @@ def advance_rig(rig_block: Block, stage_block: Block, volts: FloatArray, steps: 
             rig.impact = speed
 
 
-@compiled
+@borrowing
 def count(rig_block: Block, stage_block: Block, out: NDArray[np.int64]) -> None:
     """Whole counts of the six encoders, ``out`` (6,), from absolute zero."""
     rig: RigArrays = rig_block[0]

@@ -8,7 +8,7 @@ from maglev_hw_bridge import observer
 from maglev_hw_bridge.guard_arrays import LOST, PUT_RIGHT, SOUND, GuardArrays, gap_residual
 from maglev_hw_bridge.observer import Flags
 from maglev_model.axes import PHI, THETA, X, Y, Z
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing
 from maglev_model.machine_array import machine_from_array
 
 # What speaks against encoders that stand still.
@@ -28,7 +28,7 @@ _LEAP = 3.5e-5  # in a sample no platen leaves it that fast [m]
 _AGREED = 2e-5  # how near the others must read to what is foretold then [m]
 
 
-@compiled
+@borrowing
 def _least_step(g: GuardArrays, i: int) -> float:
     """How far an encoder should at least move in this sample by the model alone [m]."""
     rate = g.least_rate
@@ -38,7 +38,7 @@ def _least_step(g: GuardArrays, i: int) -> float:
     return float(g.period * (rate[Y] + (tilt if i >= 2 else -tilt)))
 
 
-@compiled
+@borrowing
 def _at_rest(g: GuardArrays, i: int) -> bool:
     """Whether friction, or the lower stop, may hold an encoder where it is."""
     if i >= 4:
@@ -48,7 +48,7 @@ def _at_rest(g: GuardArrays, i: int) -> bool:
     return bool(g.least_rate[Y] == 0.0 and g.least_rate[PHI if i % 2 == 0 else THETA] == 0.0)
 
 
-@compiled
+@borrowing
 def look(g: GuardArrays, flying: bool, counted: Flags) -> None:
     """Which encoders counted, and how far each of the others should have moved since it did."""
     residual = gap_residual(g.believed)
@@ -69,12 +69,12 @@ def look(g: GuardArrays, flying: bool, counted: Flags) -> None:
         g.probation[i] = max(g.probation[i] - 1, 0)
 
 
-@compiled
+@borrowing
 def await_lift_off(g: GuardArrays) -> None:
     g.answered[:], g.left[:] = int(not observer.supported(g, Y)), 0.0
 
 
-@compiled
+@borrowing
 def call_the_roll(g: GuardArrays, flying: bool, counted: Flags) -> bool:
     """Do without gap encoders that do not answer when the platen lifts off; whether there are some.
 
@@ -100,13 +100,13 @@ def call_the_roll(g: GuardArrays, flying: bool, counted: Flags) -> bool:
     return found
 
 
-@compiled
+@borrowing
 def _residual_since(g: GuardArrays, i: int) -> float:
     """What four believed gaps contradict each other by since an encoder's last count [m]."""
     return abs(gap_residual(g.believed) - g.residual_then[i]) if i < 4 and g.rigid else 0.0
 
 
-@compiled
+@borrowing
 def doubt(g: GuardArrays, flying: bool, doubted: Flags) -> int:
     """Which encoders stand still, ``doubted`` (6,), where others or the model say they should not.
 
@@ -135,7 +135,7 @@ def doubt(g: GuardArrays, flying: bool, doubted: Flags) -> int:
     return CONTRADICTED if told else 0
 
 
-@compiled
+@borrowing
 def lose(g: GuardArrays, i: int) -> None:
     """Do without an encoder that stands still."""
     g.trust[i] = LOST
@@ -143,7 +143,7 @@ def lose(g: GuardArrays, i: int) -> None:
         g.stood[i - 4], g.heard[i - 4] = 1, 0
 
 
-@compiled
+@borrowing
 def listen(g: GuardArrays) -> None:
     """Believe x or z again that was lost because it stood still, and counts after all.
 
@@ -164,7 +164,7 @@ def listen(g: GuardArrays) -> None:
             observer.take_at_its_word(g, X + k, g.read[k] - step)
 
 
-@compiled
+@borrowing
 def find_stuck(g: GuardArrays, doubted: Flags, doubt: int) -> bool:
     """Do without the encoders that are doubted for too long; whether there are new ones."""
     found = False
@@ -185,7 +185,7 @@ def find_stuck(g: GuardArrays, doubted: Flags, doubt: int) -> bool:
     return found
 
 
-@compiled
+@borrowing
 def follow_model(g: GuardArrays, doubted: Flags, used: Flags) -> None:
     """What no encoder shows now, because it stands still, moves as the model alone says."""
     for axis in (X, Z):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing
 from maglev_model.machine import Machine
 
 SCALES = {'amplitude': 1.0, 'rms': math.sqrt(2.0)}
@@ -18,13 +18,13 @@ SCALES = {'amplitude': 1.0, 'rms': math.sqrt(2.0)}
 _SIN_120 = math.sqrt(3.0) / 2.0
 
 
-@compiled
+@borrowing
 def electrical_angle(machine: Machine, displacement: float) -> float:
     """Electrical angle [rad] of a motor displaced by ``displacement`` [m] along its axis."""
     return math.pi * displacement / machine.tau
 
 
-@compiled
+@borrowing
 def phase_currents(
     i_d: float, i_q: float, angle: float, scale: float
 ) -> tuple[float, float, float]:
@@ -35,7 +35,7 @@ def phase_currents(
     return alpha, -0.5 * alpha + _SIN_120 * beta, -0.5 * alpha - _SIN_120 * beta
 
 
-@compiled
+@borrowing
 def direct_quadrature_currents(
     i_a: float, i_b: float, i_c: float, angle: float, scale: float
 ) -> tuple[float, float]:

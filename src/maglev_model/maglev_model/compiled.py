@@ -29,7 +29,7 @@ with _absent('coverage'):  # a tenth of a second, for what only a coverage run c
     import numba
     from numba.np.unsafe.ndarray import to_fixed_tuple
 
-__all__ = ['compiled', 'to_fixed_tuple']
+__all__ = ['borrowing', 'compiled', 'to_fixed_tuple']
 
 Function = TypeVar('Function', bound=Callable[..., Any])
 
@@ -40,7 +40,16 @@ def compiled(function: Function) -> Function:
     Arithmetic stays IEEE in the order written (no fast-math), so that runs repeat bit by bit; a
     division by zero gives infinity or NaN, as in NumPy, which costs no test of each divisor.
     """
-    return cast(Function, numba.njit(cache=True, error_model='numpy')(function))
+    return cast(Function, numba.njit(cache=True, error_model='numpy', _nrt=True)(function))
+
+
+def borrowing(function: Function) -> Function:
+    """As :func:`compiled`, for a function that only borrows its arrays: a tenth faster in all.
+
+    Numba does not count who holds them then. The function may neither make arrays, nor copy one
+    into a slice of another, both of which Numba refuses, and must not return one it was given.
+    """
+    return cast(Function, numba.njit(cache=True, error_model='numpy', _nrt=False)(function))
 
 
 def _cache_by_sources() -> None:

@@ -11,20 +11,20 @@ from __future__ import annotations
 import math
 
 from maglev_model.axes import FloatArray
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing
 from maglev_model.inverse import CURRENT, Answer, CurrentLimits, clip
 from maglev_model.machine import Machine
 from maglev_model.motor import attraction_coefficients
 
 
-@compiled
+@borrowing
 def equilibrium_current(machine: Machine, gap: float) -> float:
     """i_d0 [A] with which every motor carries a quarter of the weight at a gap [m], by (2)."""
     a, b, _ = attraction_coefficients(machine, gap)
     return (a - math.sqrt(0.25 * machine.M_y * machine.G)) / b
 
 
-@compiled
+@borrowing
 def motor_attraction(machine: Machine, gap: float, i_d: float) -> float:
     """Attraction of one motor [N] at a gap [m] with i_d [A] and no i_q, by (2)."""
     a, b, _ = attraction_coefficients(machine, gap)
@@ -41,7 +41,7 @@ def stiffness(machine: Machine, gap: float) -> tuple[float, float, float, float,
     return alpha_y, 0.0, 0.0, tilt - machine.k_s_phi, tilt - machine.k_s_theta
 
 
-@compiled
+@borrowing
 def equilibrium_inverse(
     machine: Machine,
     limits: CurrentLimits,

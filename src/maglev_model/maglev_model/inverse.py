@@ -24,7 +24,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from maglev_model.axes import FloatArray
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing, compiled
 from maglev_model.machine import Machine
 from maglev_model.motor import attraction_coefficients
 from maglev_model.platen import affine_terms, gaps_from_outputs
@@ -61,7 +61,7 @@ NO_LIMITS = CurrentLimits(math.inf, 1.0, 0.0)
 """Any current: only what no current at all can give is out of reach."""
 
 
-@compiled
+@borrowing
 def clip(value: float, limit: float) -> float:
     """A value within ``limit`` of 0."""
     return min(max(value, -limit), limit)
@@ -108,7 +108,7 @@ def simplified_inverse(
     return CURRENT if saturated else 0
 
 
-@compiled
+@borrowing
 def _horizontal_gains(machine: Machine, gap: FloatArray) -> tuple[float, float]:
     """h_x, h_z of (11) [m/s² per A]."""
     _, _, h_1 = attraction_coefficients(machine, gap[0])
@@ -118,7 +118,7 @@ def _horizontal_gains(machine: Machine, gap: FloatArray) -> tuple[float, float]:
     return -(h_2 + h_4) / machine.M_x, -(h_1 + h_3) / machine.M_z
 
 
-@compiled
+@borrowing
 def _solve_simplified(
     a: FloatArray, b: FloatArray, c: FloatArray, wanted: FloatArray, controlled: FloatArray
 ) -> tuple[float, float, float]:
@@ -130,7 +130,7 @@ def _solve_simplified(
     return v_y, rest_phi - phi * b[2] * v_y, rest_theta - theta * c[2] * v_y
 
 
-@compiled
+@borrowing
 def _single_motor_inverse(
     machine: Machine,
     limits: CurrentLimits,
@@ -178,7 +178,7 @@ def _single_motor_inverse(
     return _with_amplitude(limits, limited_by, limited, i_q)
 
 
-@compiled
+@borrowing
 def _cut_by(limits: CurrentLimits, wanted: float, given: float, limit: float) -> int:
     """What cut an i_q to its ``limit``: the current, or the attraction that leaves less of it."""
     if given == wanted:
@@ -186,7 +186,7 @@ def _cut_by(limits: CurrentLimits, wanted: float, given: float, limit: float) ->
     return LEVITATION if limit < limits.current else CURRENT
 
 
-@compiled
+@borrowing
 def _with_amplitude(limits: CurrentLimits, limited_by: int, i_d: float, i_q: float) -> int:
     """``limited_by``, with CURRENT where anything was limited and the amplitude is at its limit."""
     if limited_by != 0 and math.hypot(i_d, i_q) >= _AT_LIMIT * limits.current:
@@ -215,8 +215,22 @@ def exact_inverse(
     """
     if machine.motors == 1.0:
         return _single_motor_inverse(machine, limits, controlled, output, wanted, answer)
-    direct, quadrature, realised, excess = answer
     work = np.empty((5, 4))
+    return _four_motor_inverse(machine, limits, controlled, output, wanted, answer, work)
+
+
+@borrowing
+def _four_motor_inverse(
+    machine: Machine,
+    limits: CurrentLimits,
+    controlled: FloatArray,
+    output: FloatArray,
+    wanted: FloatArray,
+    answer: Answer,
+    work: FloatArray,
+) -> int:
+    """As :func:`exact_inverse`, with room (5, 4) to work in."""
+    direct, quadrature, realised, excess = answer
     gap, a, b, h, attraction = work[0], work[1], work[2], work[3], work[4]
     gaps_from_outputs(machine, output, gap)
     for motor in range(4):
@@ -250,7 +264,7 @@ def exact_inverse(
     return limited_by
 
 
-@compiled
+@borrowing
 def _allocate(
     machine: Machine,
     limits: CurrentLimits,
@@ -294,7 +308,7 @@ def _allocate(
     return LEVITATION if saturated else 0
 
 
-@compiled
+@borrowing
 def _pair_need(i_q: float, b_one: float, b_two: float, difference: float, least: float) -> float:
     """Attraction [N] a pair needs for its i_q, when the first motor has ``difference`` more."""
     one = 2.0 * max(RESERVE * (b_one * i_q) ** 2, least) - difference
@@ -302,7 +316,7 @@ def _pair_need(i_q: float, b_one: float, b_two: float, difference: float, least:
     return max(one, two)
 
 
-@compiled
+@borrowing
 def _quadrature_limit(
     limits: CurrentLimits, a: FloatArray, b: FloatArray, attraction: FloatArray, first: int
 ) -> float:
@@ -322,7 +336,7 @@ def _quadrature_limit(
     return largest
 
 
-@compiled
+@borrowing
 def _direct_currents(
     limits: CurrentLimits,
     a: FloatArray,

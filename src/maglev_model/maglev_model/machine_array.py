@@ -7,7 +7,7 @@ from typing import Annotated, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from maglev_model.compiled import compiled, to_fixed_tuple
+from maglev_model.compiled import borrowing, to_fixed_tuple
 from maglev_model.machine import Machine
 
 FIELDS: Final = len(Machine._fields)
@@ -21,7 +21,7 @@ def machine_to_array(machine: Machine) -> NDArray[np.float64]:
     return np.array(machine, dtype=np.float64)
 
 
-@compiled
+@borrowing
 def machine_from_array(array: NDArray[np.float64]) -> Machine:
     """The :class:`Machine` in an array; an array is the cheaper argument for calls from Python."""
     return Machine(*to_fixed_tuple(array, FIELDS))

@@ -10,12 +10,12 @@ from __future__ import annotations
 import math
 
 from maglev_model.axes import FloatArray
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing
 from maglev_model.machine import Machine
 from maglev_model.motor import force_coefficients
 
 
-@compiled
+@borrowing
 def gaps_from_outputs(machine: Machine, output: FloatArray, gap: FloatArray) -> None:
     """Air gaps of the motors by (5).
 
@@ -29,7 +29,7 @@ def gaps_from_outputs(machine: Machine, output: FloatArray, gap: FloatArray) -> 
     gap[3] = output[0] - tilt_theta
 
 
-@compiled
+@borrowing
 def outputs_from_gaps(
     machine: Machine, gap: FloatArray, x: float, z: float, output: FloatArray
 ) -> float:
@@ -49,14 +49,14 @@ def outputs_from_gaps(
     return float(gap[0] + gap[2] - gap[1] - gap[3])
 
 
-@compiled
+@borrowing
 def _motor_forces(machine: Machine, gap: float, i_d: float, i_q: float) -> tuple[float, float]:
     """F_V and F_H of one motor [N], (1), (2)."""
     k_1, k_2, k_3, k_h = force_coefficients(machine, gap)
     return -k_1 + k_2 * i_d - k_3 * (i_d * i_d + i_q * i_q), -k_h * i_q
 
 
-@compiled
+@borrowing
 def output_accelerations(
     machine: Machine,
     y: float,
@@ -89,7 +89,7 @@ def output_accelerations(
     )
 
 
-@compiled
+@borrowing
 def accelerations(
     machine: Machine, state: FloatArray, i_d: FloatArray, i_q: FloatArray, out: FloatArray
 ) -> None:
@@ -103,7 +103,7 @@ def accelerations(
     )
 
 
-@compiled
+@borrowing
 def affine_terms(
     machine: Machine,
     y: float,

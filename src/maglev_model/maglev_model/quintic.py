@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from maglev_model.axes import FloatArray
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing, compiled
 
 PEAK_VELOCITY = 15.0 / 8.0
 """Peak speed of a minimum-jerk transition between rests, in distance / duration."""
@@ -42,7 +42,7 @@ _compiled_coefficients = compiled(_highest_coefficients)
 _compiled_evaluate = compiled(_evaluate)
 
 
-@compiled
+@borrowing
 def quintic_to_zero(
     position: float, velocity: float, acceleration: float, duration: float, elapsed: float
 ) -> tuple[float, float, float]:
@@ -101,7 +101,7 @@ def minimum_jerk(share: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]
     )
 
 
-@compiled
+@borrowing
 def transition_time(distance: float, acceleration: float, least: float) -> float:
     """Duration [s] of a minimum-jerk transition within ``acceleration``, at least ``least``."""
     return max(least, math.sqrt(PEAK_ACCELERATION * abs(distance) / acceleration))

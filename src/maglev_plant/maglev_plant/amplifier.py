@@ -13,12 +13,12 @@ from maglev_model.commutation import (
     electrical_angle,
     phase_currents,
 )
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing
 from maglev_model.machine import Machine
 from maglev_plant.arrays import StageArrays
 
 
-@compiled
+@borrowing
 def limit_phase(stage: StageArrays, phase: int, current: float) -> float:
     """Clip one phase's current [A] to what its amplifier can give now, and heat it for a sample."""
     load = stage.load[phase]
@@ -33,7 +33,7 @@ def limit_phase(stage: StageArrays, phase: int, current: float) -> float:
     return current
 
 
-@compiled
+@borrowing
 def set_targets(stage: StageArrays, machine: Machine) -> None:
     """Write what the amplifiers aim at for one sample, from the commanded currents."""
     scale = stage.dq_scale

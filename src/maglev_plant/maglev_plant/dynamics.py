@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from maglev_model.axes import FloatArray
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing
 from maglev_model.machine import Machine
 from maglev_model.machine_array import machine_from_array
 from maglev_model.platen import output_accelerations
@@ -16,7 +16,7 @@ from maglev_plant.rough import advance_rough
 from maglev_plant.stops import apply_stops
 
 
-@compiled
+@borrowing
 def derivative(
     stage: StageArrays,
     machine: Machine,
@@ -46,13 +46,13 @@ def derivative(
         rate[2 * axis + 1] = total if free else 0.0
 
 
-@compiled
+@borrowing
 def _blend(state: FloatArray, rate: FloatArray, step: float, out: FloatArray) -> None:
     for i in range(10):
         out[i] = state[i] + step * rate[i]
 
 
-@compiled
+@borrowing
 def _runge_kutta(
     stage: StageArrays,
     machine: Machine,
@@ -76,7 +76,7 @@ def _runge_kutta(
         state[i] += step / 6.0 * (k_1[i] + 2.0 * (k_2[i] + k_3[i]) + k_4[i])
 
 
-@compiled
+@borrowing
 def advance(block: Block) -> None:
     """Carry a stage over one sample with the commanded currents held; they must be finite.
 

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing, compiled
 from maglev_model.machine import Machine
 from maglev_model.machine_array import machine_from_array
 from maglev_model.records import Block
@@ -19,7 +19,7 @@ from maglev_plant.effects.sensor import count_lengths, late_by, note_own, read_l
 from maglev_plant.random_numbers import gaussian
 
 
-@compiled
+@borrowing
 def _count(value: float, resolution: float) -> float:
     """The nearest whole number of counts, as a length [m]; the value itself at resolution 0."""
     if resolution <= 0.0:
@@ -27,7 +27,7 @@ def _count(value: float, resolution: float) -> float:
     return math.floor(value / resolution + 0.5) * resolution
 
 
-@compiled
+@borrowing
 def _read(
     value: float, resolution: float, noise: float, seed: int, sample: int, channel: int
 ) -> float:
@@ -50,7 +50,7 @@ def _encode_rough(stage: StageArrays, machine: Machine) -> None:
     count_lengths(sensor, stage.seed, stage.sample, stage.reading)
 
 
-@compiled
+@borrowing
 def encode(block: Block) -> None:
     """Write what the encoders read now into ``reading`` of a stage's block."""
     stage: StageArrays = block[0]

@@ -6,14 +6,14 @@ import math
 
 import numpy as np
 
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing
 
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 _MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
 _MIX_2 = np.uint64(0x94D049BB133111EB)
 
 
-@compiled
+@borrowing
 def _uniform(key: int) -> float:
     """A number in (0, 1) from an integer, by the finalizer of SplitMix64."""
     bits = np.uint64(key) * _GOLDEN
@@ -23,7 +23,7 @@ def _uniform(key: int) -> float:
     return (float(bits >> np.uint64(11)) + 0.5) / 9007199254740992.0
 
 
-@compiled
+@borrowing
 def gaussian(seed: int, sample: int, channel: int) -> float:
     """A standard normal number that belongs to one seed, sample and channel (0..7)."""
     key = (seed << 32) ^ (sample * 16 + channel * 2)
@@ -31,7 +31,7 @@ def gaussian(seed: int, sample: int, channel: int) -> float:
     return radius * math.cos(2.0 * math.pi * _uniform(key + 1))
 
 
-@compiled
+@borrowing
 def gaussian_of(stream: int, seed: int, sample: int, channel: int) -> float:
     """As :func:`gaussian`, of further streams (1..) and any channel."""
     return gaussian(seed ^ (stream * 0x2545F491 + channel // 8 * 0x1F83D9AB), sample, channel % 8)

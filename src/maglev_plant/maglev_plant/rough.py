@@ -13,7 +13,7 @@ import numpy as np
 
 from maglev_model.axes import FloatArray
 from maglev_model.commutation import electrical_angle, phase_currents
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing, compiled
 from maglev_model.machine import Machine
 from maglev_plant.amplifier import limit_phase, set_targets
 from maglev_plant.arrays import StageArrays
@@ -34,7 +34,7 @@ from maglev_plant.effects.winding import carry_currents, flowing_currents
 from maglev_plant.stops import apply_stops
 
 
-@compiled
+@borrowing
 def _add_springs(
     effects: EffectArrays, machine: Machine, state: FloatArray, force: FloatArray
 ) -> None:
@@ -47,7 +47,7 @@ def _add_springs(
     force[0] -= 0.5 * growth * (phi * state[6] * state[6] + theta * state[8] * state[8])
 
 
-@compiled
+@borrowing
 def rough_derivative(
     stage: StageArrays,
     machine: Machine,
@@ -88,13 +88,13 @@ def rough_derivative(
         rate[2 * axis + 1] = total if free else 0.0
 
 
-@compiled
+@borrowing
 def _blend(state: FloatArray, rate: FloatArray, step: float, out: FloatArray) -> None:
     for i in range(10):
         out[i] = state[i] + step * rate[i]
 
 
-@compiled
+@borrowing
 def _runge_kutta(
     stage: StageArrays, machine: Machine, time: float, current: FloatArray, work: FloatArray
 ) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maglev_model.axes import FloatArray
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing
 from maglev_model.records import Block
 from maglev_model.stage import STOPPED_SINCE, EncoderSample, Fault, Truth, motor_currents
 from maglev_plant.arrays import StageArrays, stage_arrays
@@ -30,14 +30,14 @@ class Trajectory(NamedTuple):
     quadrature_current: FloatArray  # (n, 4) flowing [A]
 
 
-@compiled
+@borrowing
 def _read(block: Block, first: bool) -> None:
     if not first:
         advance(block)
     encode(block)
 
 
-@compiled
+@borrowing
 def _hold(i_d: FloatArray, i_q: FloatArray, command: FloatArray) -> bool:
     """Take over finite currents as the command, or leave it and return false."""
     for i in range(4):

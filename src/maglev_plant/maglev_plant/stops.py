@@ -20,11 +20,11 @@ from __future__ import annotations
 import math
 
 from maglev_model.axes import PHI, THETA, FloatArray, X, Y, Z
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing
 from maglev_plant.arrays import StageArrays
 
 
-@compiled
+@borrowing
 def _project_on_seat(
     depth: float, phi: float, theta: float, slope: float
 ) -> tuple[float, float, float]:
@@ -44,7 +44,7 @@ def _project_on_seat(
     return depth, math.copysign(flat, phi), math.copysign(steep, theta)
 
 
-@compiled
+@borrowing
 def _project_on_seat_one_tilt(depth: float, tilt: float, slope: float) -> tuple[float, float]:
     """Nearest point of ``depth + slope·|tilt| ≤ 0``, both lengths [m]."""
     push = (depth + slope * abs(tilt)) / (1.0 + slope * slope)
@@ -55,7 +55,7 @@ def _project_on_seat_one_tilt(depth: float, tilt: float, slope: float) -> tuple[
     return 0.0, 0.0
 
 
-@compiled
+@borrowing
 def _seat(stage: StageArrays, depth: float, phi: float, theta: float) -> tuple[float, float, float]:
     """Bring y's ``depth`` into a stop [m] and the tilts [rad] to the seats' cone, locks kept."""
     radius, gyration = stage.seat_radius, stage.gyration
@@ -79,18 +79,18 @@ def _seat(stage: StageArrays, depth: float, phi: float, theta: float) -> tuple[f
     return min(depth, -radius * max(abs(phi), abs(theta))), phi, theta
 
 
-@compiled
+@borrowing
 def _clip(stage: StageArrays, axis: int, value: float) -> float:
     return float(min(max(value, stage.lower[axis]), stage.upper[axis]))
 
 
-@compiled
+@borrowing
 def _arrive(stage: StageArrays, before: FloatArray, axis: int, position: float) -> None:
     stage.state[2 * axis] = position
     stage.state[2 * axis + 1] = (position - before[2 * axis]) / stage.step
 
 
-@compiled
+@borrowing
 def apply_stops(stage: StageArrays, before: FloatArray) -> None:
     """Correct the state after a free step from state ``before``, shape (10,)."""
     state, step = stage.state, stage.step

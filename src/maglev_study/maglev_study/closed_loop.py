@@ -15,7 +15,7 @@ from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import MeasurementFault, Regulator
 from maglev_controller.sample_step import FIRST_FAULT, control_step
 from maglev_model.axes import FloatArray
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing
 from maglev_model.geometry import outputs_of_gaps
 from maglev_model.records import Block
 from maglev_plant.arrays import StageArrays
@@ -82,7 +82,13 @@ def _outputs(length: FloatArray, radius: float) -> FloatArray:
     return outputs_of_gaps(length[:, :4], length[:, 4], length[:, 5], radius)
 
 
-@compiled
+@borrowing
+def _keep(row: FloatArray, values: FloatArray) -> None:
+    for i in range(row.size):
+        row[i] = values[i]
+
+
+@borrowing
 def _loop(
     control: ControlArrays,
     block: Block,
@@ -97,15 +103,16 @@ def _loop(
     delayed: bool,
     learning: LearningArrays,
     follows: NDArray[np.bool_],
+    answer: FloatArray,
 ) -> int:
     """All samples, or up to the first that the regulator refuses; returns how many went well."""
     stage: StageArrays = block[0]
-    answer, learns = np.zeros(8), follows.size > 0
+    learns = follows.size > 0
     for k in range(position.shape[0]):
-        state[k] = stage.state
+        _keep(state[k], stage.state)
         encode(block)
-        reading[k] = stage.reading
-        own[k] = stage.effects.sensor.own
+        _keep(reading[k], stage.reading)
+        _keep(own[k], stage.effects.sensor.own)
         if learns:
             look_ahead(learning, control, follows[k])
         code[k] = control_step(
@@ -205,6 +212,7 @@ def run(
             delayed,
             NO_LEARNING if learning is None else learning.arrays,
             _following(learning, follows, n),
+            np.zeros(8),
         )
         if done < n:
             gap, x, z = arrays.reading[:4], float(arrays.reading[4]), float(arrays.reading[5])

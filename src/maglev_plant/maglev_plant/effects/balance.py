@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 
 from maglev_model.axes import PHI, THETA, FloatArray, X, Y, Z
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing
 from maglev_model.machine import Machine
 from maglev_model.parameters import ParameterError
 from maglev_model.records import Record
@@ -66,7 +66,7 @@ def balance_arrays(parameters: PlantParameters, machine: Machine) -> BalanceArra
     )
 
 
-@compiled
+@borrowing
 def add_weight(balance: BalanceArrays, state: FloatArray, force: FloatArray) -> None:
     """Add the weight and its torques to ``force`` (5,)."""
     for axis in range(5):

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 import numpy as np
 
 from maglev_model.axes import FloatArray
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing
 from maglev_model.records import Record
 from maglev_plant.random_numbers import drawn
 
@@ -47,7 +47,7 @@ def floor_arrays(parameters: PlantParameters, step: float) -> FloorArrays:
     )
 
 
-@compiled
+@borrowing
 def shake(floor: FloorArrays) -> None:
     """Go on by a step; written: its acceleration."""
     for axis in range(3):

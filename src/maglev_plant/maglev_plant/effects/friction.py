@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maglev_model.axes import PHI, THETA, FloatArray, X, Z
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing, compiled
 from maglev_model.records import Record
 from maglev_plant.effects.foreign import call_friction, friction_address
 from maglev_plant.effects.parameters import FRICTIONS
@@ -95,7 +95,7 @@ def friction_arrays(
     return arrays
 
 
-@compiled
+@borrowing
 def _sliding(friction: FrictionArrays, e: int, state: FloatArray) -> float:
     """Speed of an element at a state x1..x10."""
     if e < GUIDES:
@@ -106,7 +106,7 @@ def _sliding(friction: FrictionArrays, e: int, state: FloatArray) -> float:
     return speed
 
 
-@compiled
+@borrowing
 def _level(friction: FrictionArrays, e: int, velocity: float, tilt: float) -> float:
     """F(v) of an element."""
     level = friction.level[e] * (1.0 + friction.tilt_load[e] * tilt)
@@ -116,19 +116,19 @@ def _level(friction: FrictionArrays, e: int, velocity: float, tilt: float) -> fl
     return float(level)
 
 
-@compiled
+@borrowing
 def _deflected(z: float, rest: float, velocity: float, time: float) -> float:
     """A bristle ``z`` after a time at a velocity; ``rest`` is what it slides at."""
     end = math.copysign(rest, velocity)
     return z - (end - z) * math.expm1(-abs(velocity) * time / rest)
 
 
-@compiled
+@borrowing
 def _tilt(state: FloatArray) -> float:
     return math.sqrt(state[6] * state[6] + state[8] * state[8])
 
 
-@compiled
+@borrowing
 def add_friction(
     friction: FrictionArrays, state: FloatArray, elapsed: float, force: FloatArray
 ) -> None:
@@ -154,7 +154,7 @@ def add_friction(
             force[axis] -= friction.direction[e, axis] * resisting
 
 
-@compiled
+@borrowing
 def begin_step(friction: FrictionArrays, state: FloatArray, step: float) -> None:
     """Ask a foreign model for the force it exerts in the step that begins."""
     for e in range(CABLE):
@@ -165,7 +165,7 @@ def begin_step(friction: FrictionArrays, state: FloatArray, step: float) -> None
             friction.held[e] = call_friction(friction.address, velocity, level, step, memory)
 
 
-@compiled
+@borrowing
 def carry_bristles(
     friction: FrictionArrays, before: FloatArray, state: FloatArray, step: float
 ) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing
 from maglev_model.records import Record
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def heat_arrays(parameters: PlantParameters) -> HeatArrays:
     )
 
 
-@compiled
+@borrowing
 def warm_factors(heat: HeatArrays, time: float) -> tuple[float, float]:
     """Strength of the magnets and resistance at a time [s], by those of the cold machine."""
     share = -math.expm1(-heat.rate * time) if heat.rate > 0.0 else 1.0

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maglev_model.axes import AXES, FloatArray
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing
 from maglev_model.records import Record
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def _transition(w: float, damping: float, step: float) -> FloatArray:
     )
 
 
-@compiled
+@borrowing
 def carry_modes(modes: ModeArrays, before: FloatArray, state: FloatArray, step: float) -> None:
     """Let the modes answer a step of the platen from state ``before``."""
     for k in range(modes.number):
@@ -75,7 +75,7 @@ def carry_modes(modes: ModeArrays, before: FloatArray, state: FloatArray, step: 
         modes.state[k, 1] = f[1, 0] * q + f[1, 1] * rate + modes.answer[k, 1] * a
 
 
-@compiled
+@borrowing
 def add_deflections(modes: ModeArrays, output: FloatArray) -> None:
     """Add what the modes make the encoders read to y, x, z, phi, theta (5,)."""
     for k in range(modes.number):

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 
 from maglev_model.axes import FloatArray
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing
 from maglev_model.machine import Machine
 from maglev_model.motor import force_coefficients
 from maglev_model.records import Record
@@ -94,7 +94,7 @@ def motor_arrays(parameters: PlantParameters, machine: Machine) -> MotorArrays:
     )
 
 
-@compiled
+@borrowing
 def motor_gap(motors: MotorArrays, motor: int, state: FloatArray) -> tuple[float, float]:
     """Gap [m] of a motor and its rate [m/s], at a state x1..x10."""
     x, z = motors.place[motor, 0], motors.place[motor, 1]
@@ -102,7 +102,7 @@ def motor_gap(motors: MotorArrays, motor: int, state: FloatArray) -> tuple[float
     return gap, state[1] + x * state[9] - z * state[7]
 
 
-@compiled
+@borrowing
 def along_across(motors: MotorArrays, motor: int, x: float, z: float) -> tuple[float, float]:
     """A displacement or speed (x, z) along a motor's thrust and across it."""
     main, other = (z, x) if motor % 2 == 0 else (x, z)
@@ -110,13 +110,13 @@ def along_across(motors: MotorArrays, motor: int, x: float, z: float) -> tuple[f
     return main * cosine + other * sine, other * cosine - main * sine
 
 
-@compiled
+@borrowing
 def thrust_factor(motors: MotorArrays, along: float) -> float:
     """By how much ripple makes the thrust larger at a displacement [m] along the motor."""
     return 1.0 + motors.ripple * math.cos(motors.ripple_wave * along)
 
 
-@compiled
+@borrowing
 def motor_coefficients(
     machine: Machine, motors: MotorArrays, motor: int, gap: float, along: float
 ) -> tuple[float, float, float, float]:
@@ -126,7 +126,7 @@ def motor_coefficients(
     return m * m * k_1, m * w * k_2, w * w * k_3, m * w * thrust_factor(motors, along) * k_h
 
 
-@compiled
+@borrowing
 def add_motor_forces(
     machine: Machine,
     motors: MotorArrays,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 import numpy as np
 
 from maglev_model.axes import FloatArray
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing
 from maglev_model.records import Record
 from maglev_plant.effects.foreign import call_sensor, sensor_address
 from maglev_plant.random_numbers import drawn, gaussian, gaussian_of
@@ -66,7 +66,7 @@ def sensor_arrays(parameters: PlantParameters) -> SensorArrays:
     )
 
 
-@compiled
+@borrowing
 def read_lengths(
     sensor: SensorArrays, output: FloatArray, rate: FloatArray, radius: float, reading: FloatArray
 ) -> None:
@@ -83,7 +83,7 @@ def read_lengths(
     reading[4], reading[5] = x + sensor.squareness[0] * z, z
 
 
-@compiled
+@borrowing
 def late_by(sensor: SensorArrays, seed: int, sample: int) -> float:
     """How late this sample is taken [s], negative for early."""
     if sensor.jitter == 0.0:
@@ -91,7 +91,7 @@ def late_by(sensor: SensorArrays, seed: int, sample: int) -> float:
     return sensor.jitter * gaussian_of(_STREAM, seed, sample, 0)
 
 
-@compiled
+@borrowing
 def _on_scale(sensor: SensorArrays, i: int, length: float) -> float:
     """A length as the scale of encoder ``i`` has it, zero aside."""
     length *= 1.0 + sensor.scale[i]
@@ -103,7 +103,7 @@ def _on_scale(sensor: SensorArrays, i: int, length: float) -> float:
     return length + error
 
 
-@compiled
+@borrowing
 def note_own(sensor: SensorArrays, lengths: FloatArray) -> None:
     """Keep what true ``lengths`` (6,) [m] are on the encoders' own scales, between the counts."""
     half = -0.5 if sensor.floor else 0.0
@@ -112,7 +112,7 @@ def note_own(sensor: SensorArrays, lengths: FloatArray) -> None:
         sensor.own[i] = _on_scale(sensor, i, lengths[i]) + shift
 
 
-@compiled
+@borrowing
 def count_lengths(sensor: SensorArrays, seed: int, sample: int, reading: FloatArray) -> None:
     """Turn true lengths into what the encoders read, in place, ``reading`` (6,) [m]."""
     half = 0.0 if sensor.floor else 0.5

@@ -25,7 +25,7 @@ import numpy as np
 
 from maglev_model.axes import FloatArray
 from maglev_model.commutation import SCALES, direct_quadrature_currents, phase_currents
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing, compiled
 from maglev_model.machine import Machine
 from maglev_model.motor import force_coefficients
 from maglev_model.parameters import ParameterError
@@ -134,7 +134,7 @@ def _integrals(machine: Machine, gaps: FloatArray, scale: float) -> FloatArray:
     )
 
 
-@compiled
+@borrowing
 def inductance(winding: WindingArrays, strength: float, gap: float) -> float:
     """L(g) [H] of a motor whose winding has that strength, by cubic Hermite interpolation."""
     place = (gap - winding.least_gap) / winding.spacing
@@ -149,7 +149,7 @@ def inductance(winding: WindingArrays, strength: float, gap: float) -> float:
     return float(winding.fixed + strength * strength * value)
 
 
-@compiled
+@borrowing
 def _flow(
     winding: WindingArrays,
     current: float,
@@ -186,7 +186,7 @@ def _middle(winding: WindingArrays, state: FloatArray, step: float) -> FloatArra
     return middle
 
 
-@compiled
+@borrowing
 def carry_currents(
     machine: Machine,
     motors: MotorArrays,
@@ -222,7 +222,7 @@ def carry_currents(
         mean[motor], mean[4 + motor] = direct_quadrature_currents(a, b, c, angle, winding.scale)
 
 
-@compiled
+@borrowing
 def flowing_currents(
     motors: MotorArrays, winding: WindingArrays, state: FloatArray, out: FloatArray
 ) -> None:
