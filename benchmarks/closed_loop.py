@@ -29,7 +29,7 @@ from maglev_study.references import References, ellipse
 
 REAL_TIME_FACTOR = 100.0
 SCIPY_RATIO = 30.0
-C_RATIO = 1.8  # wanted is 1.5
+C_RATIO = 1.5
 EARLIER = 'f0ed2d5'
 OURS, IN_C, SCIPY = 'compiled loop', 'plainly in C', 'SciPy'
 SAME = 1e-9  # trajectories of the same work are at most this far apart [m, rad]
