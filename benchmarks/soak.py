@@ -1,0 +1,163 @@
+#!/usr/bin/env python3
+"""The ellipse in real time behind the emulated bridge for half an hour, on a machine that works.
+
+    python benchmarks/soak.py [--minutes M] [--stage hw_bridge|plant] [--out DIR]
+
+Beside it: a busy process for each core, one that fills and frees 400 MB over and over, two
+strangers on every topic of the stage, and 20 MB a second of somebody else's messages. Prints
+memory, open files and threads of each node, at the begin and the end, and what the run says of
+itself. Exits with 1 when the run did not pass, lost a message, or a node grew.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+ROOT = Path(__file__).resolve().parents[1]
+SUPPORT = ROOT / 'test' / 'support'
+BUSY = 'while True: pass'
+FILLING = 'import time\nwhile True: bytes(400_000_000); time.sleep(0.05)'
+TALKING = """
+import rclpy
+from std_msgs.msg import ByteMultiArray
+rclpy.init()
+node = rclpy.create_node('talker')
+to = node.create_publisher(ByteMultiArray, 'somebody_elses', 10)
+node.create_subscription(ByteMultiArray, 'somebody_elses', lambda message: None, 10)
+message = ByteMultiArray(data=[b'a'] * 200_000)
+node.create_timer(0.01, lambda: to.publish(message))
+rclpy.spin(node)
+"""
+SETTLED = 120.0  # after which a node has all it needs [s]
+GROWTH = 5.0  # of a node's memory, from then on [MB an hour], besides what pages are counted twice
+SLACK = 2.0  # [MB]
+PERIOD = 5.0  # between two looks [s]
+
+
+class Look(NamedTuple):
+    """What a process holds."""
+
+    time: float  # [s]
+    memory: float  # resident [MB]
+    files: int
+    threads: int
+
+
+def look(pid: int) -> Look | None:
+    """At a process; None when it is gone."""
+    with contextlib.suppress(OSError):
+        lines = Path(f'/proc/{pid}/status').read_text().splitlines()
+        status = dict(line.split(':', 1) for line in lines)
+        files = len(os.listdir(f'/proc/{pid}/fd'))
+        memory = int(status['VmRSS'].split()[0]) / 1024
+        return Look(time.monotonic(), memory, files, int(status['Threads']))
+    return None
+
+
+def nodes(scenario: int) -> dict[str, int]:
+    """Executables of this workspace that a scenario has started, by name."""
+    found: dict[str, int] = {}
+    for entry in Path('/proc').glob('[0-9]*'):
+        with contextlib.suppress(OSError, ValueError, IndexError):
+            if os.getsid(int(entry.name)) != os.getsid(scenario):
+                continue
+            for word in (entry / 'cmdline').read_bytes().decode().split('\0')[:3]:
+                if '/lib/maglev_' in word:
+                    found[Path(word).name] = int(entry.name)
+    return found
+
+
+@contextlib.contextmanager
+def load() -> Iterator[None]:
+    """Others at work."""
+    scripts = [BUSY] * len(os.sched_getaffinity(0)) + [FILLING, TALKING]
+    commands = [[sys.executable, '-c', script] for script in scripts]
+    commands += [[sys.executable, str(SUPPORT / 'stranger.py')]] * 2
+    started = [subprocess.Popen(words, stdout=subprocess.DEVNULL) for words in commands]
+    try:
+        yield
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
+
+
+def fly(minutes: float, stage: str, out: Path) -> dict[str, list[Look]]:
+    """The scenario, and what its nodes held all along."""
+    command = [str(ROOT / 'scenarios' / 'ellipse.sh'), '--stage', stage, '--mode', 'realtime']
+    command += ['--duration', str(60.0 * minutes), '--quiet', '--out', str(out)]
+    held: dict[str, list[Look]] = {}
+    with load():
+        scenario = subprocess.Popen(command, start_new_session=True)
+        while scenario.poll() is None:
+            for name, pid in nodes(scenario.pid).items():
+                if seen := look(pid):
+                    held.setdefault(name, []).append(seen)
+            time.sleep(PERIOD)
+    return held
+
+
+def growth(held: list[Look]) -> tuple[float, int]:
+    """Memory [MB] and open files that a process has more at the end than once it had settled."""
+    settled = [one for one in held if one.time > held[0].time + SETTLED] or held
+    tenth = max(len(settled) // 10, 1)
+    begin, end = settled[:tenth], settled[-tenth:]
+    memory = min(one.memory for one in end) - min(one.memory for one in begin)
+    return memory, min(one.files for one in end) - min(one.files for one in begin)
+
+
+def wrong_with(held: dict[str, list[Look]], metrics: dict[str, Any], hours: float) -> list[str]:
+    """What is not as it shall be."""
+    wrong = [] if metrics['verdict'] == 'pass' else [f'the run says: {metrics["reasons"]}']
+    if metrics['missing_samples']:
+        wrong.append(f'{metrics["missing_samples"]} samples are missing')
+    for name, looks in held.items():
+        memory, files = growth(looks)
+        if memory > SLACK + GROWTH * hours:
+            wrong.append(f'{name} grew by {memory:.1f} MB')
+        if files > 0:
+            wrong.append(f'{name} holds {files} files more')
+    return wrong
+
+
+def main() -> int:
+    """Fly, look and tell."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument('--minutes', type=float, default=30.0)
+    parser.add_argument('--stage', choices=('hw_bridge', 'plant'), default='hw_bridge')
+    parser.add_argument('--out', type=Path, help='where the run is left; forgotten otherwise')
+    asked = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        out = asked.out or Path(folder) / 'run'
+        held = fly(asked.minutes, asked.stage, out)
+        try:
+            metrics = json.loads((out / 'metrics.json').read_text(encoding='utf-8'))
+        except FileNotFoundError:
+            print('the run left no figures')
+            return 1
+    for name, looks in sorted(held.items()):
+        memory, files = growth(looks)
+        print(
+            f'{name:12} {looks[0].memory:6.1f} to {looks[-1].memory:6.1f} MB, at most '
+            f'{max(one.memory for one in looks):.1f}; settled it grew by {memory:+.1f} MB and '
+            f'{files:+d} files; {looks[-1].threads} threads'
+        )
+    print('timing', json.dumps(metrics['timing']), 'missing', metrics['missing_samples'])
+    print('errors', json.dumps(metrics['own_axes']))
+    wrong = wrong_with(held, metrics, asked.minutes / 60)
+    print('\n'.join(wrong) or 'nothing lost, nothing grew')
+    return int(bool(wrong))
+
+
+if __name__ == '__main__':
+    sys.exit(main())
