@@ -8,8 +8,10 @@ by the clock and with the limits of real boards: currents 5 ms old, a sample 5 m
 of 20 ms. At some instant between rest and rest one of them gets what its seed says. Looked at are
 the platen's true speed where it meets a stop, that no current stays, that all that live end in
 order when asked to, and that the next run starts. Runs in which the machine itself was late, by a
-thread of the highest priority or by a watchdog that expired with nothing done to the bridge, are
-counted apart. Exits with 1 when another broke a rule.
+thread of the highest priority, are counted apart. Exits with 1 when another broke a rule.
+
+Where the bridge is killed, frozen or stopped for longer than its watchdog the boards cut, and the
+emulated machine, which is its own, tells no more: of these only the ends and starts are looked at.
 """
 
 from __future__ import annotations
@@ -24,7 +26,7 @@ import tempfile
 import time
 from collections import Counter
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -38,7 +40,7 @@ from maglev_node.topics import MEASUREMENT, REFERENCE, SAMPLE_TOPICS, TRUE_STATE
 UPPER_STOP = 0.018
 DEGRADED = 0.05  # landings by the bridge, at most [m/s]
 TOUCHING = 1e-5  # [m]
-FLIGHT = 6.0  # from the first sample to the last of a flight left to itself, about [s]
+FLIGHT = 6.0  # from the first reference to the last of a flight left to itself, about [s]
 LONGEST = 20.0  # until nothing moves, and until a process has ended [s]
 TARGETS = ('hw_bridge', 'controller', 'reference', 'recorder')
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -119,7 +121,7 @@ def at_rest(observer: Observer) -> bool:
     held = observer.look()[TRUE_STATE]
     return len(held) > 300 and all(
         abs(message.state[0] - LOWER_STOP) < TOUCHING
-        and not np.any(np.abs(message.direct_current) > 1e-3)
+        and not np.any(np.abs([message.direct_current, message.quadrature_current]) > 1e-3)
         for message in (held[-1], held[-150], held[-300])
     )
 
@@ -159,7 +161,7 @@ def end(run: Run, graph: dict[str, Process]) -> list[str]:
     return wrong
 
 
-def fly(run: Run) -> dict[str, object]:
+def fly(run: Run) -> dict[str, Any]:
     """One run; what came of it, by name."""
     with tempfile.TemporaryDirectory() as folder, Witness() as witness:
         nodes, observer = Nodes(Path(folder)), Observer()
@@ -185,13 +187,12 @@ def fly(run: Run) -> dict[str, object]:
         if speed > DEGRADED and not run.cut:
             wrong.append(f'met a stop at {speed:.3f} m/s')
         said = {process.log.stem: process.output[-2000:] for process in nodes.started}
-        expired = not run.cut and any('watchdog expired' in output for output in said.values())
     return {
         **run._asdict(),
         'gap': None if before is None else float(before.state[0]),
         'speed': speed,
         'late': witness.worst,
-        'disturbed': witness.disturbed or expired,
+        'disturbed': witness.disturbed,
         'wrong': wrong,
         'said': said if wrong else {},
     }
@@ -215,15 +216,15 @@ def main() -> int:
         if one['wrong']:
             late = ', on a machine that was late' * bool(one['disturbed'])
             told = f'{one["target"]}, {one["what"]} after {one["instant"]:.2f} s'
-            print(f'seed {seed}: {told}: {"; ".join(one["wrong"])}{late}', flush=True)  # type: ignore[arg-type]
+            print(f'seed {seed}: {told}: {"; ".join(one["wrong"])}{late}', flush=True)
     tell(outcomes, time.monotonic() - begun)
     return int(any(one['wrong'] and not one['disturbed'] for one in outcomes))
 
 
-def tell(outcomes: list[dict[str, object]], took: float) -> None:
+def tell(outcomes: list[dict[str, Any]], took: float) -> None:
     """Runs, broken ones and speeds, by process and what happened to it."""
 
-    def kind(one: dict[str, object]) -> tuple[str, str]:
+    def kind(one: dict[str, Any]) -> tuple[str, str]:
         what = str(one['what'])
         return str(one['target']), what if what in ('kill', 'freeze', 'stop') else 'signals'
 
@@ -232,7 +233,7 @@ def tell(outcomes: list[dict[str, object]], took: float) -> None:
         these = [one for one in outcomes if kind(one) == (target, what)]
         quiet = [one for one in these if not one['disturbed']]
         broken = sum(bool(one['wrong']) for one in quiet)
-        speed = max((float(one['speed']) for one in quiet), default=0.0)  # type: ignore[arg-type]
+        speed = max((float(one['speed']) for one in quiet), default=0.0)
         disturbed = len(these) - len(quiet)
         print(
             f'{target:10} {what:8} {runs:4} runs, {disturbed:3} on a machine that was late; '

@@ -5,8 +5,8 @@
 
 Beside it: a busy process for each core, one that fills and frees 400 MB over and over, two
 strangers on every topic of the stage, and 20 MB a second of somebody else's messages. Prints
-memory, open files and threads of each node, at the begin and the end, and what the run says of
-itself. Exits with 1 when the run did not pass, lost a message, or a node grew.
+memory of each node at the beginning and the end, how it and the open files grew, and what the run
+says of itself. Exits with 1 when the run did not pass, lost a message, or a node grew.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ node.create_timer(0.01, lambda: to.publish(message))
 rclpy.spin(node)
 """
 SETTLED = 120.0  # after which a node has all it needs [s]
-GROWTH = 5.0  # of a node's memory, from then on [MB an hour], besides what pages are counted twice
-SLACK = 2.0  # [MB]
+GROWTH = 5.0  # of a node's memory, from then on [MB an hour]
+SLACK = 2.0  # by which two looks at the same may differ [MB]
 PERIOD = 5.0  # between two looks [s]
 
 

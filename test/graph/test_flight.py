@@ -55,7 +55,7 @@ def test_lift_off_ellipse_landing(nodes: Nodes, watching: Observer) -> None:
     assert ControllerState.FAULT not in modes
     assert ControllerState.LANDING not in modes
     samples(watching, 10)
-    watching.wait(lambda: idles(watching))  # with the reference gone
+    watching.wait(lambda: idles(watching), timeout=10.0)  # with the reference gone
 
 
 def test_a_controller_is_waited_for_and_lands_without_its_reference(
