@@ -112,7 +112,6 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         self.create_service(SetBool, '~/learn', self._on_learn)
         self.create_timer(_REFERENCE_PERIOD, self._take_references, clock=self.steady_clock)
         self.create_timer(_WATCH_PERIOD, self._watch, clock=self.steady_clock)
-        self.take_realtime_priority()
         for line in self.supervisor.regulator.describe_loops():
             self.get_logger().info(line)
         # The first line a process logs takes 20 ms, so it must not be one that is logged in flight.
@@ -372,6 +371,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
     def spin(self, stop: Callable[[], bool]) -> None:
         """Serve the graph; however that ends, in flight a landing comes before the end."""
         try:
+            self.take_realtime_priority()
             super().spin(stop)
         except Exception as error:
             self.supervisor.stop(f'defect: {error!r}')

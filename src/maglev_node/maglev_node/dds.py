@@ -2,42 +2,44 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 from pathlib import Path
 
-from maglev_node.port_locks import FIRST_PORT, PORTS, free_ports
+_PROFILES = 'FASTRTPS_DEFAULT_PROFILES_FILE'
+_TRANSPORTS = 'FASTDDS_BUILTIN_TRANSPORTS'
+_RANGE, _PEERS = 'ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_STATIC_PEERS'
+_BY_PROFILE = 'SYSTEM_DEFAULT'  # what rmw_fastrtps leaves to the profile
+_ANYWHERE = Path(__file__).with_name('fastdds.xml')
+_HERE = Path(__file__).with_name('fastdds_here.xml')
 
-_VARIABLE = 'FASTRTPS_DEFAULT_PROFILES_FILE'
-_RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
-_PROFILE = Path(__file__).with_name('fastdds.xml')
-_WATCHER = Path(__file__).with_name('fastdds_watcher.xml')
+_FIRST_PORT, _PORTS = 7400, 250  # of domain 0, and of each domain (DDSI-RTPS 9.6.1.1)
 
 
 def prepare_middleware() -> None:
-    """Choose the middleware's profile and free what killed processes hold on to.
+    """Let Fast DDS carry messages over the network, on one machine too, with our timing.
 
-    For Fast DDS, before the process makes its first node; other middleware does not heed it.
+    Its shared memory has locks that all processes of a domain take. Whoever is interrupted while it
+    holds one, as what has no real-time priority is on a busy machine, keeps the loop waiting for as
+    long, and whoever is killed then for seconds.
+    Before the process makes its first node; other middleware does not heed it, and a profile that
+    is given stays.
     """
-    os.environ.setdefault(_VARIABLE, str(_PROFILE))
-    with contextlib.suppress(ValueError, OSError):  # a wrong domain is for ROS to refuse
-        free_ports(int(os.environ.get('ROS_DOMAIN_ID') or 0))
-
-
-def share_no_memory() -> None:
-    """Let a process that only watches be heard and told over the network alone.
-
-    A loop that shares memory with one that is killed now and then waits for it, up to two seconds:
-    so long does Fast DDS take to find out. Of no effect where a profile is given.
-    """
-    given = os.environ.get(_VARIABLE, str(_PROFILE)) != str(_PROFILE)
-    if given or os.environ.get(_RANGE) != 'LOCALHOST':
-        os.environ.setdefault('FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4')
+    os.environ.setdefault(_TRANSPORTS, 'UDPv4')
+    if os.environ.get(_PROFILES, '') not in ('', str(_ANYWHERE), str(_HERE)):
         return
-    # There rmw_fastrtps adds shared memory whatever is asked for; the profile keeps to this machine
-    # in its place.
-    os.environ[_RANGE] = 'SYSTEM_DEFAULT'
-    os.environ[_VARIABLE] = str(_WATCHER)
+    here = only_here() and not os.environ.get(_PEERS)
+    os.environ[_PROFILES] = str(_HERE if here else _ANYWHERE)
+    if here:
+        # With LOCALHOST rmw_fastrtps adds shared memory whatever is asked for; the profile keeps to
+        # this machine in its place.
+        os.environ[_RANGE] = _BY_PROFILE
+
+
+def only_here() -> bool:
+    """Whether nodes of this process, or of one that it starts, see those of this machine alone."""
+    where = os.environ.get(_RANGE)
+    by_profile = where == _BY_PROFILE and os.environ.get(_PROFILES) == str(_HERE)
+    return where == 'LOCALHOST' or by_profile
 
 
 def local_participants(domain: int) -> int:
@@ -45,7 +47,7 @@ def local_participants(domain: int) -> int:
 
     Raises OSError where the system does not tell.
     """
-    first = FIRST_PORT + PORTS * domain
-    unicast = range(first + 10, first + PORTS, 2)
+    first = _FIRST_PORT + _PORTS * domain
+    unicast = range(first + 10, first + _PORTS, 2)
     lines = Path('/proc/net/udp').read_text(encoding='ascii').splitlines()[1:]
     return len({int(line.split()[1].partition(':')[2], 16) for line in lines} & set(unicast))

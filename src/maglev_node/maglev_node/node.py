@@ -121,8 +121,9 @@ class MaglevNode(PollingNode, Generic[P]):
     def take_realtime_priority(self) -> None:
         """In real time, take SCHED_FIFO for all threads and lock the memory, where permitted.
 
-        For nodes with :class:`SourceParameters`, when their publishers and subscriptions exist, so
-        that the middleware's threads do too. What is not permitted is said once.
+        For nodes with :class:`SourceParameters`, when all is built that takes long, which would
+        keep others from the processor, and when publishers and subscriptions exist, so that the
+        middleware's threads do too. What is not permitted is said once.
         """
         parameters: Any = self.parameters
         if parameters.mode != 'realtime' or parameters.realtime_priority == 0:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import secrets
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -120,7 +120,6 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         self.create_service(Trigger, '~/land', self._land)
         self.create_service(Step, '~/step', self._step)
         self.create_timer(self.parameters.poll_period, self._poll, clock=self.steady_clock)
-        self.take_realtime_priority()
 
     def _poll(self) -> None:
         """Take what is new, and publish what is due."""
@@ -363,6 +362,11 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         if self._run.left:
             return DiagnosticStatus.WARN, f'left the run: {self._run.left}', facts
         return DiagnosticStatus.OK, 'running', facts
+
+    def spin(self, stop: Callable[[], bool]) -> None:
+        """Serve the graph."""
+        self.take_realtime_priority()
+        super().spin(stop)
 
 
 def _point(given: Any) -> Point:

@@ -13,7 +13,7 @@ import rclpy
 from rclpy.signals import SignalHandlerOptions
 from rclpy.topic_or_service_is_hidden import topic_or_service_is_hidden
 
-from maglev_node.dds import local_participants, prepare_middleware
+from maglev_node.dds import local_participants, only_here, prepare_middleware
 from maglev_node.polling import PollingNode
 from maglev_ros2cli.errors import CommandError
 from maglev_ros2cli.parser import Parser, complete
@@ -161,8 +161,7 @@ def _complete(own: PollingNode, waited: float) -> bool:
     participants = {
         bytes(info.endpoint_gid[:_PREFIX]) for info in infos if info.node_name != _UNKNOWN
     }
-    here = os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE') == 'LOCALHOST'
-    return len(participants) >= there and (here or waited >= ABROAD_WAIT)
+    return len(participants) >= there and (only_here() or waited >= ABROAD_WAIT)
 
 
 def _state(own: PollingNode) -> object:

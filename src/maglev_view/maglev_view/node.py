@@ -19,7 +19,6 @@ from visualization_msgs.msg import MarkerArray
 
 from maglev_model.axes import FloatArray
 from maglev_model.geometry import outputs_of_gaps
-from maglev_node.dds import share_no_memory
 from maglev_node.graph_guard import GraphGuard
 from maglev_node.node import MaglevNode, NodeParameters
 from maglev_node.polling import PolledSubscription
@@ -204,7 +203,6 @@ class ViewNode(MaglevNode[ViewNodeParameters]):
 
 def main() -> None:
     """Entry point of the executable."""
-    share_no_memory()
     run_main(ViewNode, 'view', background=True)
 
 

@@ -10,7 +10,6 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from maglev_monitor.metrics.decoding import DecodeError, decode
-from maglev_node.dds import share_no_memory
 from maglev_node.node import MaglevNode, NodeError, NodeParameters
 from maglev_node.process import main as run_main
 from maglev_node.topics import (
@@ -116,7 +115,6 @@ def _qos(depth: int) -> QoSProfile:
 
 def main() -> None:
     """Entry point of the executable."""
-    share_no_memory()
     run_main(WebNode, 'web', background=True)
 
 
