@@ -85,14 +85,15 @@ def look(pid: int) -> Look | None:
 
 
 def nodes(scenario: int) -> dict[str, int]:
-    """Executables of this workspace that a scenario has started, by name."""
+    """Nodes that a scenario has started, by name."""
     found: dict[str, int] = {}
     for entry in Path('/proc').glob('[0-9]*'):
         with contextlib.suppress(OSError, ValueError, IndexError):
             if int((entry / 'stat').read_text().rpartition(')')[2].split()[1]) != scenario:
                 continue
-            for word in (entry / 'cmdline').read_bytes().decode().split('\0')[:3]:
-                if '/lib/maglev_' in word:
+            words = (entry / 'cmdline').read_bytes().decode().split('\0')
+            for word in words[:3]:
+                if '/lib/maglev_' in word and '--ros-args' in words:  # a tool is none
                     found[Path(word).name] = int(entry.name)
     return found
 

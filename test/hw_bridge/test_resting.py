@@ -183,3 +183,18 @@ def test_a_platen_that_slides_along_without_current_is_a_fault(
         assert flight.stage.reset()[0]
         flight.run(200, controlled=False)
         assert flight.stage.fault is None  # it stands there now
+
+
+@pytest.mark.parametrize(('height', 'refused'), [(0.031, False), (0.03097, True)])
+def test_no_current_may_be_asked_for_where_the_encoders_have_it_on_the_stop(
+    height: float, *, refused: bool
+) -> None:
+    flight = Flight(hover(height))
+    flight.run(30)
+    assert flight.stage.flying
+    flight.stage.read()
+    flight.stage.guard.arrays.position[0] = height - 1.5e-5  # as where the stop bears a part
+    flight.stage.write(np.zeros(4), np.zeros(4))
+    fault = flight.stage.fault
+    assert (fault is not None and 'zero currents' in str(fault)) == refused
+    assert flight.stage.flying == refused

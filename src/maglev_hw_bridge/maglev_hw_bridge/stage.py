@@ -235,8 +235,16 @@ class BridgeStage(StageLife):
         return bool(y > self._lower_stop - _ON_THE_STOP and abs(rate) < _AT_REST)
 
     def _on_the_stop(self) -> bool:
-        """Whether it may well rest there, though they have it a little above."""
-        return self._touches() or self._still_samples * self.sample_time >= _REST_TIME
+        """Whether it may well rest there, though the observer has it a little above.
+
+        That one takes no account of what the stop carries, and lags behind the counts where the
+        platen has come to rest a moment ago.
+        """
+        state = self.guard.arrays
+        if self._touches() or self._still_samples * self.sample_time >= _REST_TIME:
+            return True
+        counted = bool(np.min(state.believed[:4]) > self._lower_stop - _ON_THE_STOP)
+        return counted and abs(state.rate[0]) < _AT_REST
 
     def _put_out(self) -> None:
         if self.mode is Mode.LANDING:
