@@ -6,9 +6,9 @@
 Beside it: a busy process for each core, one that fills and frees 400 MB over and over, two
 strangers on every topic of the stage, and 20 MB a second of somebody else's messages. Prints
 memory of each node at the beginning and the end, how it and the open files grew, late samples and
-errors, and beside them how late the machine wakes a bare timer of higher priority: what it does not
-run, no node can. Errors are held to 1 mm and 1 mrad only. Exits with 1 when the run did not pass,
-lost a message, or a node grew.
+errors, and beside them how late the machine itself was: what keeps a thread of the highest priority
+waiting, no node can do without. Errors are held to 1 mm and 1 mrad only. Exits with 1 when the run
+did not pass, lost a message, or a node grew.
 """
 
 from __future__ import annotations
@@ -25,6 +25,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
+sys.path.insert(0, str(Path(__file__).parents[1] / 'test' / 'support'))
+from witness import Witness
+
 ROOT = Path(__file__).resolve().parents[1]
 SUPPORT = ROOT / 'test' / 'support'
 BUSY = 'while True: pass'
@@ -39,17 +42,6 @@ node.create_subscription(ByteMultiArray, 'somebody_elses', lambda message: None,
 message = ByteMultiArray(data=[b'a'] * 200_000)
 node.create_timer(0.01, lambda: to.publish(message))
 rclpy.spin(node)
-"""
-TIMER = """
-import os, time
-os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(60))
-due = time.monotonic()
-while True:
-    due = max(due + 1e-3, time.monotonic())
-    time.sleep(max(due - time.monotonic(), 0.0))
-    late = time.monotonic() - due
-    if late > 1e-3:
-        print(late, flush=True)
 """
 LIMITS = """
 monitor:
@@ -96,26 +88,6 @@ def nodes(scenario: int) -> dict[str, int]:
                 if '/lib/maglev_' in word and '--ros-args' in words:  # a tool is none
                     found[Path(word).name] = int(entry.name)
     return found
-
-
-@contextlib.contextmanager
-def bare_timer() -> Iterator[list[float]]:
-    """How late a timer of 1 ms at a priority above the graph's was, each time it was by 1 ms [s].
-
-    Empty where the priority is not permitted.
-    """
-    late: list[float] = []
-    with tempfile.TemporaryFile('w+') as said:
-        timer = subprocess.Popen(
-            [sys.executable, '-c', TIMER], stdout=said, stderr=subprocess.DEVNULL
-        )
-        try:
-            yield late
-        finally:
-            timer.kill()
-            timer.wait()
-            said.seek(0)
-            late += [float(line) for line in said]
 
 
 @contextlib.contextmanager
@@ -182,7 +154,7 @@ def main() -> int:
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         out = asked.out or Path(folder) / 'run'
-        with bare_timer() as late:
+        with Witness() as witness:
             held = fly(asked.minutes, asked.stage, out, Path(folder) / 'limits.yaml')
         try:
             metrics = json.loads((out / 'metrics.json').read_text(encoding='utf-8'))
@@ -196,10 +168,7 @@ def main() -> int:
             f'{max(one.memory for one in looks):.1f}; settled it grew by {memory:+.1f} MB and '
             f'{files:+d} files; {looks[-1].threads} threads'
         )
-    print(
-        f'the machine woke a bare timer late by more than 1 ms {len(late)} times, '
-        f'at most by {1e3 * max(late, default=0.0):.1f} ms'
-    )
+    print(f'the machine kept a thread of the highest priority waiting for {witness.worst:.4f} s')
     print('timing', json.dumps(metrics['timing']), 'missing', metrics['missing_samples'])
     print('errors', json.dumps(metrics['own_axes']))
     wrong = wrong_with(held, metrics, asked.minutes / 60)

@@ -230,9 +230,12 @@ class BridgeStage(StageLife):
         return slid
 
     def _touches(self) -> bool:
-        """Whether the platen is on its lower stop as the encoders have it."""
-        y, rate = self.guard.arrays.position[0], self.guard.arrays.rate[0]
-        return bool(y > self._lower_stop - _ON_THE_STOP and abs(rate) < _AT_REST)
+        """Whether the platen is on its lower stop as the observer has it."""
+        return self._rests_at(self.guard.arrays.position[0])
+
+    def _rests_at(self, y: float) -> bool:
+        slow = abs(self.guard.arrays.rate[0]) < _AT_REST
+        return bool(slow and y > self._lower_stop - _ON_THE_STOP)
 
     def _on_the_stop(self) -> bool:
         """Whether it may well rest there, though the observer has it a little above.
@@ -240,11 +243,8 @@ class BridgeStage(StageLife):
         That one takes no account of what the stop carries, and lags behind the counts where the
         platen has come to rest a moment ago.
         """
-        state = self.guard.arrays
-        if self._touches() or self._still_samples * self.sample_time >= _REST_TIME:
-            return True
-        counted = bool(np.min(state.believed[:4]) > self._lower_stop - _ON_THE_STOP)
-        return counted and abs(state.rate[0]) < _AT_REST
+        still = self._still_samples * self.sample_time >= _REST_TIME
+        return still or self._touches() or self._rests_at(np.min(self.guard.arrays.believed[:4]))
 
     def _put_out(self) -> None:
         if self.mode is Mode.LANDING:
