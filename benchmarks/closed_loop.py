@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from earlier import EarlierLoop
 from in_c import LoopInC
-from peers import fly, with_control, with_scipy
+from peers import fly, with_control, with_mujoco, with_scipy
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
@@ -95,6 +95,25 @@ def in_turn(references: References, library: LoopInC, times: int) -> dict[str, f
     return {name: min(each[name] for each in found) for name in runs}
 
 
+def of_peers(references: References, samples: int) -> dict[str, float]:
+    """Seconds of all the references with other integrators, from the first ``samples`` of them."""
+    few = References(*(array[:samples] for array in references))
+    found = {}
+    for name, make in (
+        (SCIPY, with_scipy),
+        ('python-control', with_control),
+        ('MuJoCo', with_mujoco),
+    ):
+        try:
+            fly(make, stage_at(few), References(*(array[:2] for array in references)))
+        except ImportError as error:
+            print(f'nothing of {name}: {error}')
+            continue
+        taken, _ = fly(make, stage_at(few), few)
+        found[name] = taken * len(references.position) / len(few.position)
+    return found
+
+
 def main() -> int:
     """Measure, print, judge."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -109,11 +128,7 @@ def main() -> int:
     apart = apart_from_c(library, references)
     seconds = in_turn(references, library, arguments.times)
     ours = seconds[OURS]
-    for name, make in ((SCIPY, with_scipy), ('python-control', with_control)):
-        fly(make, stage_at(references), References(*(array[:2] for array in references)))
-        few = References(*(array[: arguments.peers_samples] for array in references))
-        taken, _ = fly(make, stage_at(few), few)
-        seconds[name] = taken * len(references.position) / len(few.position)
+    seconds |= of_peers(references, arguments.peers_samples)
     by_ours = {name: value / ours for name, value in seconds.items()}
     factor = arguments.duration / ours
 

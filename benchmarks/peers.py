@@ -22,6 +22,7 @@ from maglev_plant.simulation import SimulatedStage
 from maglev_study.linear import StageAt, nonlinear_plant
 from maglev_study.references import HOVER, References
 
+STEPS = 10  # of MuJoCo in a sample
 TOLERANCES = {'rtol': 1e-8, 'atol': 1e-11}
 
 Carry = Callable[[FloatArray, FloatArray], FloatArray]
@@ -58,6 +59,55 @@ def with_control(stage: SimulatedStage) -> Carry:
         return np.asarray(found.states[:, -1])
 
     return carry
+
+
+def with_mujoco(stage: SimulatedStage) -> Carry:
+    """MuJoCo's own Runge-Kutta steps on five bodies, a joint each, under our forces.
+
+    The amplifiers' lag wants shorter steps than where it is integrated exactly. Raises ImportError
+    where ``pip install mujoco`` is missing.
+    """
+    import mujoco
+
+    at = StageAt(stage.parameters, HOVER)
+    lag = at.lag
+    model = mujoco.MjModel.from_xml_string(_free_axes(stage.parameters.sample_time / STEPS))
+    data, order, joined = mujoco.MjData(model), slice(0, 10, 2), np.empty(10)
+    command, off = np.zeros(8), np.zeros(8)
+
+    def push(_: object, moving: mujoco.MjData) -> None:
+        joined[::2], joined[1::2] = moving.qpos, moving.qvel
+        flowing = command + off * np.exp(-lag * moving.time)
+        moving.qfrc_passive[:] = at.rates(0.0, joined, flowing)[1::2]
+
+    def carry(state: FloatArray, wanted: FloatArray) -> FloatArray:
+        command[:], off[:] = wanted, state[10:] - wanted
+        data.time, data.qpos[:], data.qvel[:] = 0.0, state[order], state[1:10:2]
+        mujoco.set_mjcb_passive(push)
+        mujoco.mj_step(model, data, nstep=STEPS)
+        mujoco.set_mjcb_passive(None)
+        joined[::2], joined[1::2] = data.qpos, data.qvel
+        return np.concatenate((joined, command + off * np.exp(-lag * data.time)))
+
+    return carry
+
+
+def _free_axes(step: float) -> str:
+    """Masses and inertias of 1, free to move along y, x, z and about X and Z: forces are rates."""
+    inertia = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+    joints = [
+        f'<joint type="{kind}" axis="{axis}"/>'
+        for kind, axis in zip(
+            ('slide', 'slide', 'slide', 'hinge', 'hinge'),
+            ('0 1 0', '1 0 0', '0 0 1', '1 0 0', '0 0 1'),
+            strict=True,
+        )
+    ]
+    bodies = ''.join(f'<body>{inertia}{joint}</body>' for joint in joints)
+    return (
+        f'<mujoco><option timestep="{step}" gravity="0 0 0" integrator="RK4"/>'
+        f'<worldbody>{bodies}</worldbody></mujoco>'
+    )
 
 
 def fly(
