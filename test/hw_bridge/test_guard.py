@@ -28,6 +28,42 @@ def test_a_count_tells_only_of_the_axes_that_move_its_encoder(encoder: int, told
     assert set(np.flatnonzero(watched.still_time == 0.0)) == told
 
 
+@pytest.mark.parametrize(
+    ('moved', 'pushed', 'held'),
+    [(0.02, -5.5, True), (0.02, -6.5, False), (-0.02, -5.5, False), (0.0, -3.5, False)],
+)
+def test_friction_turns_where_the_motion_does(moved: float, pushed: float, held: bool) -> None:
+    """Then it may hold what was just now pushed by as much, twice the bound of 3 rad/s^2."""
+    watched = guard.Guard(PARAMETERS).arrays
+    record = watched.block[0]
+    observer.start(record, np.array([0.025, 0.025, 0.025, 0.025, 0.0, 0.0]))
+    watched.rate_then[THETA], watched.disturbance_then[THETA] = moved, pushed
+    for _ in range(3):
+        observer.predict(record, np.zeros(12))
+    assert bool(watched.least_rate[THETA] == 0.0) is held
+
+
+def test_what_begins_on_its_stop_rests_whatever_noise_says() -> None:
+    """As speed it would be braked, and so the platen thrown off the stop that it rests on."""
+    judge, stop = guard.Guard(PARAMETERS), PARAMETERS.machine.gap_max
+    length = np.array([stop, stop, stop, stop, 0.0, 0.0])
+    for noise in (6.9e-4, 3.2e-4):
+        length[3] = stop + noise
+        code, index = judge.watch(length, np.zeros(12), False)
+    assert (code, index) == (guard.JUMP, 3)
+    assert np.all(judge.arrays.rate == 0.0)
+
+
+def test_what_begins_aloft_moves_as_it_is_read() -> None:
+    judge, length = guard.Guard(PARAMETERS), np.array([0.025, 0.025, 0.025, 0.025, 0.0, 0.0])
+    for _ in range(2):
+        code, _ = judge.watch(length, np.zeros(12), True)
+        assert code == guard.FINE
+        length[:4] -= 1e-5
+        length[5] += 2e-5
+    assert judge.arrays.rate == pytest.approx([-0.01, 0.0, 0.02, 0.0, 0.0], abs=1e-9)
+
+
 @pytest.mark.parametrize(('current', 'found'), [(0.02, []), (1.0, [4])])
 def test_x_is_missed_near_the_lower_stop_too_when_a_gap_is_lost(
     current: float, found: list[int]

@@ -221,6 +221,21 @@ def pushed(position: np.ndarray, rate: np.ndarray, push: np.ndarray) -> np.ndarr
 PLACE = np.array([0.025, 0.0, 0.0, 0.0, 0.0])
 
 
+@pytest.mark.parametrize(
+    ('blind', 'over'),
+    [({1}, True), ({2}, True), ({1, 3}, True), ({1, 2, 4}, False), ({3}, False), (set(), False)],
+)
+def test_unseen_along_x_or_z_it_is_over_on_the_stop_itself(blind: set[int], over: bool) -> None:
+    """Not with theta unknown too: the mean gap is there while the platen stands on an edge."""
+    parameters = BridgeParameters()
+    landing, position = Landing(parameters), np.array([0.025, 0.0, 0.0, 0.0, 0.0])
+    landing.begin(position, np.zeros(5), np.isin(np.arange(5), list(blind)))
+    position[0] = parameters.machine.gap_max - 6e-5
+    assert not landing.step(position, np.zeros(5), np.zeros(5))
+    position[0] = parameters.machine.gap_max - 4e-5
+    assert landing.step(position, np.zeros(5), np.zeros(5)) is over
+
+
 def test_what_the_model_does_not_explain_is_made_up_for_along_y_alone() -> None:
     made = pushed(np.zeros(5), np.zeros(5), np.array([1.5, 0.2, 0.2, 0.0, 0.0]))
     assert made == pytest.approx((-1.5, 0.0, 0.0), abs=0.01)

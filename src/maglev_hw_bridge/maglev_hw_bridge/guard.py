@@ -84,18 +84,27 @@ def _unexplained(g: GuardArrays) -> int:
 
 
 @compiled
-def _begin(g: GuardArrays) -> None:
-    """Take the first samples for the platen's position and rate."""
+def _begin(g: GuardArrays) -> int:
+    """Take the first samples for the platen's position and rate; returns a code.
+
+    What rests on the lower stop does not move: noise would look like speed, a slip like a jerk.
+    """
     if g.samples == 0:
         observer.start(g, g.believed)
         g.past[0] = g.believed
         g.residual_then[:] = gap_residual(g.believed)
         await_lift_off(g)
-    else:
-        before = g.position.copy()
+        return FINE
+    before = g.position.copy()
+    if observer.supported(g, Y):
+        g.step[:] = 0.0
+        found = find_leaps(g)
         observer.start(g, g.believed)
-        for axis in range(5):
-            g.rate[axis] = g.model_rate[axis] = (g.position[axis] - before[axis]) / g.period
+        return JUMP if found else FINE
+    observer.start(g, g.believed)
+    for axis in range(5):
+        g.rate[axis] = g.model_rate[axis] = (g.position[axis] - before[axis]) / g.period
+    return FINE
 
 
 @compiled
@@ -139,14 +148,11 @@ def watch(
         if behind > 0 and g.samples >= _BEGUN:
             g.believed[i] -= behind * g.at_once[i] * g.step[i]
     listen(g)
-    code, index = FINE, 0
-    if g.samples < _BEGUN:
-        _begin(g)
-    else:
-        code = _judge(g, current, flying)
-        for i in range(5, -1, -1):
-            if g.blamed[i] != 0:
-                index = i
+    index = 0
+    code = _begin(g) if g.samples < _BEGUN else _judge(g, current, flying)
+    for i in range(5, -1, -1):
+        if g.blamed[i] != 0:
+            index = i
     if code == FINE and flying:
         axis = _unexplained(g)
         if axis >= 0:

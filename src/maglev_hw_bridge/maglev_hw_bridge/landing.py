@@ -14,7 +14,7 @@ import numpy as np
 
 from maglev_hw_bridge.observer import Flags
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_model.axes import FloatArray, X, Z
+from maglev_model.axes import THETA, FloatArray, X, Z
 from maglev_model.compiled import compiled
 from maglev_model.inverse import Answer, CurrentLimits, exact_inverse
 from maglev_model.machine import Machine, machine_constants
@@ -41,6 +41,7 @@ x and z come first: along them the platen runs off to a stop 50 mm away, in a ti
 _PATIENCE = 2.0  # times as far x and z may be off their way where a cut would throw it up
 _TILT = 0.95  # share of the attraction that tilts may take there
 _BRAKING_UPWARD = 0.1  # of y [s]
+_SEATED = 5e-5  # so near the lower stop a cut is soft [m]
 _FREE_STEP = 1e-4  # of the motion without current [s]
 _LONGEST_FALL = 10.0  # [s]
 _FASTEST = 0.7  # a free fall from anywhere is slower [m/s]
@@ -66,6 +67,7 @@ class LandingArrays(Record):
     descent_time: float  # [s]
     settle_time: float  # [s]
     aim: float  # of the descent [m]
+    end: float  # air gap at which it is over whatever the time, or infinite [m]
     period: float  # [s]
     balance: float  # air gap below which the magnets pull it up [m]
     stray: Annotated[FloatArray, 5]  # farther from it the platen is not held any more [m, rad]
@@ -123,7 +125,8 @@ def land(block: Block, position: FloatArray, rate: FloatArray, disturbance: Floa
         wanted,
         Answer(landing.direct[:], landing.quadrature[:], np.empty(5), np.empty(2)),
     )
-    return time > landing.descent_start + landing.descent_time + landing.settle_time
+    over = time > landing.descent_start + landing.descent_time + landing.settle_time
+    return over or position[0] > landing.end
 
 
 class Landing:
@@ -134,6 +137,7 @@ class Landing:
         self._lower = np.maximum(np.array(machine.lower_limit), np.array(fault.lower))
         self._upper = np.minimum(np.array(machine.upper_limit), np.array(fault.upper))
         self._parameters = landing
+        self._floor = machine.gap_max
         self.arrays = LandingArrays(
             machine=machine_constants(machine),
             current_limit=landing.current,
@@ -165,15 +169,24 @@ class Landing:
     def begin(self, position: FloatArray, rate: FloatArray, blind: Flags = SEEING) -> None:
         """Start where the platen is: (5,) [m, rad] and per second; ``blind`` (5,): seen by nothing.
 
-        Where the model alone tells of an axis it is over sooner. A motor whose displacement is not
-        known pushes along it unless its i_d is small or negative, and the magnets undo the springs
-        of a tilt that is not known the less its motors pull: that decides which pair carries.
+        Where the model alone tells of an axis it is over sooner, soonest where that is x or z:
+        motors push off what they do not see, the more the farther it is. For that, currents end on
+        the stop itself, but for a theta that is not known either: it may be on an edge.
+
+        A motor whose displacement is not known pushes along it unless its i_d is small or negative,
+        and the magnets undo the springs of a tilt that is not known the less its motors pull: that
+        decides which pair carries.
         """
         way, landing = self.arrays, self._parameters
+        adrift = bool(blind[X] or blind[Z])
         rate = np.where(_ACROSS & (np.abs(rate) < _REST), 0.0, rate)
-        hurried = bool(np.any(blind))
-        way.descent_start = landing.blind_braking_time if hurried else landing.braking_time
-        way.descent_time = landing.blind_descent_time if hurried else landing.descent_time
+        way.descent_start, way.descent_time = landing.braking_time, landing.descent_time
+        if np.any(blind):
+            way.descent_start = landing.blind_braking_time
+            way.descent_time = landing.blind_descent_time
+        if adrift:
+            way.descent_time = landing.adrift_descent_time
+        way.end = self._floor - _SEATED if adrift and not blind[THETA] else math.inf
         way.along_z = 0.5 + 0.5 * float(np.clip(_CARRY @ blind, -1.0, 1.0))
         way.braking[:] = braking_times(position, rate, self._lower, self._upper, way.descent_start)
         if rate[0] < 0.0:  # towards the motors, where a tilt still takes room

@@ -146,16 +146,19 @@ class BridgeLandingParameters:
         1.0, 'time to descend to the lower stop', unit='s', within=(0.1, 60.0)
     )
     blind_braking_time: float = parameter(
-        0.06, 'the first where an axis is seen by no encoder', unit='s', within=(0.05, 10.0)
+        0.05, 'the first where an axis is seen by no encoder', unit='s', within=(0.05, 10.0)
     )
     blind_descent_time: float = parameter(
-        0.28, 'the second where an axis is seen by no encoder', unit='s', within=(0.1, 60.0)
+        0.28, 'the second where a tilt is seen by no encoder', unit='s', within=(0.1, 60.0)
+    )
+    adrift_descent_time: float = parameter(
+        0.15, 'the second where x or z is seen by no encoder', unit='s', within=(0.1, 60.0)
     )
     settle_time: float = parameter(
         0.2, 'time pressed on the stop before the end', unit='s', within=(0.0, 10.0)
     )
     depth: float = parameter(
-        5e-4,
+        2e-4,
         'how far below the stop the descent aims, to arrive whatever the model says',
         unit='m',
         within=(0.0, 5e-3),
