@@ -1,4 +1,4 @@
-"""What the whole graph costs: lockstep tick against a bare echo, start-up, memory.
+"""What the whole graph costs: lockstep tick against a bare echo, CPU time, start-up, memory.
 
 Runs bare echoes between two rclpy processes and the ellipse scenario (plant, controller, reference,
 monitor, recorder) in turn, so that a drifting machine drifts for both, and prints the ratio of the
@@ -18,9 +18,11 @@ import tempfile
 import threading
 import time
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from maglev_model.axes import FloatArray
 from maglev_monitor.bag.reader import Bag
 
 ROOT = Path(__file__).parents[1]
@@ -45,12 +47,13 @@ def round_trip(executor: str, seconds: float) -> float:
     return float(asked.stdout)
 
 
-class Memory(threading.Thread):
-    """Watches the largest resident memory of each node [MB]."""
+class Watch(threading.Thread):
+    """Watches each node's largest resident memory [MB], and its CPU time [s] as it goes."""
 
     def __init__(self) -> None:
         super().__init__(daemon=True)
         self.peak: dict[str, float] = {}
+        self.spent: dict[str, list[tuple[float, float]]] = {}  # wall clock and CPU time
         self.over = threading.Event()
 
     def run(self) -> None:
@@ -60,31 +63,60 @@ class Memory(threading.Thread):
                 try:
                     words = (entry / 'cmdline').read_bytes().decode().split('\0')
                     status = (entry / 'status').read_text()
+                    tasks = [task.read_text() for task in entry.glob('task/*/schedstat')]
                 except (OSError, UnicodeDecodeError):
                     continue
                 node = [Path(word).name for word in words if f'{ROOT}/install/maglev_' in word]
                 peak = [line.split()[1] for line in status.splitlines() if 'VmHWM' in line]
                 if node and peak and node[0] != 'analyze':
                     self.peak[node[0]] = max(self.peak.get(node[0], 0.0), int(peak[0]) / 1024)
+                    spent = 1e-9 * sum(int(task.split()[0]) for task in tasks)
+                    self.spent.setdefault(node[0], []).append((time.time(), spent))
+
+    def by_tick(self, clock: FloatArray) -> dict[str, float]:
+        """CPU time of each node in a tick [s], of the ticks at ``clock`` (n,) [s since the epoch].
+
+        From the middle eight tenths of them: nodes start, and end, beside the others.
+        """
+        first, last = np.quantile(clock, (0.1, 0.9))
+        ticks = np.count_nonzero((clock >= first) & (clock < last))
+        used = {}
+        for node, spent in self.spent.items():
+            when, sums = np.array(spent).T
+            if when[0] <= first and when[-1] >= last:
+                used[node] = float(np.interp(last, when, sums) - np.interp(first, when, sums))
+        return {node: seconds / ticks for node, seconds in used.items()}
 
 
-def levitating_at(bag: Path) -> float:
-    """Wall clock of the first sample that levitates [s since the epoch]."""
+def flown(bag: Path) -> tuple[FloatArray, float]:
+    """Wall clock of every sample [s since the epoch], and of the first that levitates."""
+    parts: dict[str, list[Any]] = {'plant': [], 'measurement': []}
     for batch in Bag(bag).batches():
-        states = batch.samples.get('plant')
-        if states is None:
-            continue
-        flying = np.nonzero(states['state'][:, 0] < LEVITATING)[0]
-        if len(flying):
-            first = states[flying[0]]
-            return float(first['seconds']) + 1e-9 * float(first['nanoseconds'])
-    raise SystemExit('graph: the platen never levitated')
+        for topic, found in parts.items():
+            if topic in batch.samples:
+                found.append(batch.samples[topic])
+    states, read = (np.concatenate(found) for found in parts.values())
+    flying = states['sequence'][states['state'][:, 0] < LEVITATING]
+    if len(flying) == 0:
+        raise SystemExit('graph: the platen never levitated')
+    clock = 1e-9 * read['wall_time']
+    return clock, float(clock[np.searchsorted(read['sequence'], flying[0])])
 
 
-def scenario(folder: Path, duration: float, *options: str) -> tuple[float, float, float]:
-    """Run the ellipse: median tick [s], real-time factor, time until it levitates [s]."""
+class Flown(NamedTuple):
+    """What a run of the ellipse took [s]."""
+
+    tick: float  # median
+    factor: float  # real-time factor
+    start: float  # until it levitates
+    spent: dict[str, float]  # by node, CPU time in a tick
+
+
+def scenario(folder: Path, duration: float, watch: Watch) -> Flown:
+    """Run the ellipse."""
+    watch.spent.clear()
     began = time.time()
-    called = [str(ROOT / 'scenarios' / 'ellipse.sh'), *options]
+    called = [str(ROOT / 'scenarios' / 'ellipse.sh')]
     done = subprocess.run(
         [*called, '--duration', str(duration), '--out', folder],
         capture_output=True,
@@ -93,8 +125,16 @@ def scenario(folder: Path, duration: float, *options: str) -> tuple[float, float
     if done.returncode != 0:
         raise SystemExit(f'graph: the scenario failed:\n{done.stdout}{done.stderr}')
     timing = json.loads((folder / 'metrics.json').read_text())['timing']
-    start = levitating_at(folder / 'bag') - began
-    return timing['tick_p50'], timing['real_time_factor'], start
+    clock, levitates = flown(folder / 'bag')
+    return Flown(
+        timing['tick_p50'], timing['real_time_factor'], levitates - began, watch.by_tick(clock)
+    )
+
+
+def _by_node(rounds: list[dict[str, float]]) -> list[str]:
+    nodes = {node: [one[node] for one in rounds if node in one] for one in rounds for node in one}
+    middle = {node: 1e6 * statistics.median(times) for node, times in nodes.items()}
+    return [f'{node} {us:.0f}' for node, us in middle.items()] + [f'all {sum(middle.values()):.0f}']
 
 
 def main() -> int:
@@ -103,33 +143,35 @@ def main() -> int:
     parser.add_argument('--rounds', type=int, default=3)
     parser.add_argument('--duration', type=float, default=15.0, help='measured time of a run [s]')
     options = parser.parse_args()
-    memory = Memory()
-    memory.start()
-    rows = []
+    watch = Watch()
+    watch.start()
+    rows, spent = [], []
     for number in range(options.rounds):
         default, events = round_trip('default', 3.0), round_trip('events', 3.0)
         with tempfile.TemporaryDirectory() as folder:
-            tick, factor, start = scenario(Path(folder) / 'run', options.duration)
-        rows.append((tick / default, tick / events, factor, start))
+            run = scenario(Path(folder) / 'run', options.duration, watch)
+        rows.append((run.tick / default, run.tick / events, run.factor, run.start))
+        spent.append(run.spent)
         print(
-            f'round {number + 1}: tick {tick * 1e6:.0f} us, bare echo {default * 1e6:.0f} us'
+            f'round {number + 1}: tick {run.tick * 1e6:.0f} us, bare echo {default * 1e6:.0f} us'
             f' (default executor), {events * 1e6:.0f} us (events executor);'
-            f' {factor:.2f} x real time, levitates after {start:.1f} s',
+            f' {run.factor:.2f} x real time, levitates after {run.start:.1f} s',
             flush=True,
         )
-    memory.over.set()
+    watch.over.set()
     by_default, by_events, factor, start = (
         statistics.median(row) for row in zip(*rows, strict=True)
     )
     print(f'tick / bare echo, rclpy default executor: {by_default:.2f}')
     print(f'tick / bare echo, EventsExecutor:         {by_events:.2f}')
     print(f'real-time factor: {factor:.2f}, from command to levitation: {start:.1f} s')
-    print('peak memory [MB]: ' + ', '.join(f'{n} {mb:.0f}' for n, mb in memory.peak.items()))
+    print('CPU time in a tick [us]: ' + ', '.join(_by_node(spent)))
+    print('peak memory [MB]: ' + ', '.join(f'{n} {mb:.0f}' for n, mb in watch.peak.items()))
     kept = (
         min(by_default, by_events) <= LARGEST_RATIO
         and factor >= LEAST_FACTOR
         and start <= LONGEST_START
-        and max(memory.peak.values()) <= MOST_MEMORY
+        and max(watch.peak.values()) <= MOST_MEMORY
     )
     return 0 if kept else 1
 
