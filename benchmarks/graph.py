@@ -87,6 +87,14 @@ class Watch(threading.Thread):
                 used[node] = float(np.interp(last, when, sums) - np.interp(first, when, sums))
         return {node: seconds / ticks for node, seconds in used.items()}
 
+    def until(self, moment: float) -> dict[str, float]:
+        """CPU time of each node by then [s]; ``moment`` [s since the epoch]."""
+        return {
+            node: float(np.interp(moment, *np.array(spent).T))
+            for node, spent in self.spent.items()
+            if spent[0][0] < moment
+        }
+
 
 def flown(bag: Path) -> tuple[FloatArray, float]:
     """Wall clock of every sample [s since the epoch], and of the first that levitates."""
@@ -109,6 +117,7 @@ class Flown(NamedTuple):
     tick: float  # median
     factor: float  # real-time factor
     start: float  # until it levitates
+    starting: dict[str, float]  # by node, CPU time until then
     spent: dict[str, float]  # by node, CPU time in a tick
 
 
@@ -127,14 +136,19 @@ def scenario(folder: Path, duration: float, watch: Watch) -> Flown:
     timing = json.loads((folder / 'metrics.json').read_text())['timing']
     clock, levitates = flown(folder / 'bag')
     return Flown(
-        timing['tick_p50'], timing['real_time_factor'], levitates - began, watch.by_tick(clock)
+        timing['tick_p50'],
+        timing['real_time_factor'],
+        levitates - began,
+        watch.until(levitates),
+        watch.by_tick(clock),
     )
 
 
-def _by_node(rounds: list[dict[str, float]]) -> list[str]:
+def _by_node(rounds: list[dict[str, float]], scale: float) -> str:
     nodes = {node: [one[node] for one in rounds if node in one] for one in rounds for node in one}
-    middle = {node: 1e6 * statistics.median(times) for node, times in nodes.items()}
-    return [f'{node} {us:.0f}' for node, us in middle.items()] + [f'all {sum(middle.values()):.0f}']
+    middle = {node: scale * statistics.median(times) for node, times in nodes.items()}
+    middle['all'] = sum(middle.values())
+    return ', '.join(f'{node} {time:.0f}' for node, time in middle.items() if time >= 0.5)
 
 
 def main() -> int:
@@ -145,13 +159,13 @@ def main() -> int:
     options = parser.parse_args()
     watch = Watch()
     watch.start()
-    rows, spent = [], []
+    rows, runs = [], []
     for number in range(options.rounds):
         default, events = round_trip('default', 3.0), round_trip('events', 3.0)
         with tempfile.TemporaryDirectory() as folder:
             run = scenario(Path(folder) / 'run', options.duration, watch)
         rows.append((run.tick / default, run.tick / events, run.factor, run.start))
-        spent.append(run.spent)
+        runs.append(run)
         print(
             f'round {number + 1}: tick {run.tick * 1e6:.0f} us, bare echo {default * 1e6:.0f} us'
             f' (default executor), {events * 1e6:.0f} us (events executor);'
@@ -165,7 +179,9 @@ def main() -> int:
     print(f'tick / bare echo, rclpy default executor: {by_default:.2f}')
     print(f'tick / bare echo, EventsExecutor:         {by_events:.2f}')
     print(f'real-time factor: {factor:.2f}, from command to levitation: {start:.1f} s')
-    print('CPU time in a tick [us]: ' + ', '.join(_by_node(spent)))
+    starting, spent = [run.starting for run in runs], [run.spent for run in runs]
+    print('CPU time until it levitates [ms]: ' + _by_node(starting, 1e3))
+    print('CPU time in a tick [us]: ' + _by_node(spent, 1e6))
     print('peak memory [MB]: ' + ', '.join(f'{n} {mb:.0f}' for n, mb in watch.peak.items()))
     kept = (
         min(by_default, by_events) <= LARGEST_RATIO
