@@ -54,6 +54,15 @@ def test_what_begins_on_its_stop_rests_whatever_noise_says() -> None:
     assert np.all(judge.arrays.rate == 0.0)
 
 
+@pytest.mark.parametrize(('encoder', 'away'), [(0, -0.8), (3, 0.03), (4, 0.47), (5, -0.1)])
+def test_what_begins_where_no_platen_can_be_has_lost_its_count(encoder: int, away: float) -> None:
+    judge, stop = guard.Guard(PARAMETERS), PARAMETERS.machine.gap_max
+    length = np.array([stop, stop, stop, stop, 0.0, 0.0])
+    length[encoder] += away
+    assert judge.watch(length, np.zeros(12), False) == (guard.JUMP, encoder)
+    assert judge.failed == [encoder]
+
+
 def test_what_begins_aloft_moves_as_it_is_read() -> None:
     judge, length = guard.Guard(PARAMETERS), np.array([0.025, 0.025, 0.025, 0.025, 0.0, 0.0])
     for _ in range(2):

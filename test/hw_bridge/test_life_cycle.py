@@ -184,7 +184,7 @@ def heat(stage: BridgeStage, _boards: EmulatedBoards) -> None:
 
 
 def shift_x(_stage: BridgeStage, boards: EmulatedBoards) -> None:
-    boards.jumps[4] += 20_000
+    boards.jumps[4] += 5_200  # 52 mm
 
 
 AGAINST: list[tuple[Callable[[BridgeStage, EmulatedBoards], None], str]] = [

@@ -46,6 +46,7 @@ MOTORS: Final = 6
 _RESIDUAL_SAMPLES = 2
 _UNEXPLAINED_SAMPLES = 10
 _BEGUN = 2  # samples for position and rate
+_IMPOSSIBLE = 0.01  # so far beyond its stop, tilts and all, an encoder reads no place [m]
 
 
 @borrowing
@@ -83,6 +84,18 @@ def _unexplained(g: GuardArrays) -> int:
     return -1
 
 
+@borrowing
+def _lose_impossible(g: GuardArrays) -> bool:
+    """Do without what reads a place where no platen can be; whether there is some."""
+    found = False
+    for i in range(6):
+        axis = Y if i < 4 else i - 3
+        room = max(g.lower[axis] - g.believed[i], g.believed[i] - g.upper[axis])
+        if g.trust[i] != LOST and room > _IMPOSSIBLE:
+            g.trust[i], g.blamed[i], found = LOST, 1, True
+    return found
+
+
 @compiled
 def _begin(g: GuardArrays) -> int:
     """Take the first samples for the platen's position and rate; returns a code.
@@ -90,11 +103,12 @@ def _begin(g: GuardArrays) -> int:
     What rests on the lower stop does not move: noise would look like speed, a slip like a jerk.
     """
     if g.samples == 0:
+        lost = _lose_impossible(g)
         observer.start(g, g.believed)
         g.past[0] = g.believed
         g.residual_then[:] = gap_residual(g.believed)
         await_lift_off(g)
-        return FINE
+        return JUMP if lost else FINE
     before = g.position.copy()
     if observer.supported(g, Y):
         g.step[:] = 0.0
