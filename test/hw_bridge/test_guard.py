@@ -9,6 +9,8 @@ from maglev_hw_bridge import guard, guard_arrays, observer
 from maglev_hw_bridge.amplifiers import Amplifiers
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_model.axes import PHI, THETA, X, Y, Z
+from maglev_model.machine import machine_constants
+from maglev_model.platen import output_accelerations
 
 PARAMETERS = BridgeParameters()
 
@@ -28,16 +30,24 @@ def test_a_count_tells_only_of_the_axes_that_move_its_encoder(encoder: int, told
     assert set(np.flatnonzero(watched.still_time == 0.0)) == told
 
 
+def pull_of_tilt(theta: float) -> float:
+    """Acceleration of theta at 25 mm, without current [rad/s^2]."""
+    machine, none = machine_constants(PARAMETERS.machine), np.zeros(4)
+    return output_accelerations(machine, 0.025, 0.0, theta, none, none)[THETA]
+
+
 @pytest.mark.parametrize(
-    ('moved', 'pushed', 'held'),
-    [(0.02, -5.5, True), (0.02, -6.5, False), (-0.02, -5.5, False), (0.0, -3.5, False)],
-)
-def test_friction_turns_where_the_motion_does(moved: float, pushed: float, held: bool) -> None:
-    """Then it may hold what was just now pushed by as much, twice the bound of 3 rad/s^2."""
+    ('then', 'pushed', 'held'),
+    [(-2.0, -4.9, True), (-2.0, -5.1, False), (-4.0, -5.9, True), (-4.0, -6.1, False),
+     (0.0, -2.9, True), (2.0, -3.1, False)],
+)  # fmt: skip
+def test_what_friction_may_have_been_can_turn(then: float, pushed: float, held: bool) -> None:
+    """What pushed along at the last count, up to the bound of 3 rad/s^2, may hold as well."""
     watched = guard.Guard(PARAMETERS).arrays
     record = watched.block[0]
     observer.start(record, np.array([0.025, 0.025, 0.025, 0.025, 0.0, 0.0]))
-    watched.rate_then[THETA], watched.disturbance_then[THETA] = moved, pushed
+    watched.disturbance_then[THETA] = then
+    watched.position[THETA] = 1e-3 * (pushed - then) / pull_of_tilt(1e-3)
     for _ in range(3):
         observer.predict(record, np.zeros(12))
     assert bool(watched.least_rate[THETA] == 0.0) is held

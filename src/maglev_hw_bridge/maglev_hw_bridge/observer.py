@@ -55,7 +55,6 @@ class ObserverArrays(Record):
     still_time: Annotated[FloatArray, 5]  # [s]
     disturbance_then: Annotated[FloatArray, 5]
     least_rate: Annotated[FloatArray, 5]  # what friction leaves of model_rate
-    rate_then: Annotated[FloatArray, 5]  # at that count
 
 
 def observer_fields(parameters: BridgeParameters) -> dict[str, Any]:
@@ -89,7 +88,7 @@ def start(o: ObserverArrays, length: FloatArray) -> None:
     for axis in range(5):
         o.rate[axis] = o.disturbance[axis] = 0.0
         o.model_rate[axis] = o.least_rate[axis] = 0.0
-        o.disturbance_then[axis] = o.still_time[axis] = o.rate_then[axis] = 0.0
+        o.disturbance_then[axis] = o.still_time[axis] = 0.0
 
 
 @borrowing
@@ -160,8 +159,8 @@ def _carry(o: ObserverArrays, axis: int, push: float, held: float) -> None:
         o.rate[axis] = 0.0
     o.model_rate[axis] += period * (push + o.disturbance_then[axis])
     o.still_time[axis] += period
-    if o.model_rate[axis] * o.rate_then[axis] < 0.0:
-        held += o.friction[axis]  # which turns where the motion does
+    along = math.copysign(1.0, o.model_rate[axis]) * o.disturbance_then[axis]
+    held += min(max(along, 0.0), o.friction[axis])  # it may have been friction, which can turn
     left = abs(o.model_rate[axis]) - held * o.still_time[axis]
     if left > 0.0 and not _stopped(o, axis):
         o.least_rate[axis] = math.copysign(left, o.model_rate[axis])
@@ -189,8 +188,7 @@ def correct(o: ObserverArrays, length: FloatArray, used: Flags, counted: Flags) 
     told = (along_z or along_x, counted[4], counted[5], along_z, along_x)
     for axis in range(5):
         if told[axis]:
-            o.model_rate[axis] = o.rate_then[axis] = o.rate[axis]
-            o.still_time[axis] = 0.0
+            o.model_rate[axis], o.still_time[axis] = o.rate[axis], 0.0
             o.disturbance_then[axis] = o.disturbance[axis]
 
 
