@@ -48,30 +48,40 @@ def round_trip(executor: str, seconds: float) -> float:
 
 
 class Watch(threading.Thread):
-    """Watches each node's largest resident memory [MB], and its CPU time [s] as it goes."""
+    """Watches each node's largest memory [MB], and its CPU time [s] as it goes."""
 
     def __init__(self) -> None:
         super().__init__(daemon=True)
-        self.peak: dict[str, float] = {}
+        self.peak: dict[str, float] = {}  # resident
+        self.share: dict[str, float] = {}  # what several have counted in parts
         self.spent: dict[str, list[tuple[float, float]]] = {}  # wall clock and CPU time
         self.over = threading.Event()
 
     def run(self) -> None:
         """Look until ``over`` is set."""
+        looks = 0
         while not self.over.wait(0.2):
+            looks += 1
             for entry in Path('/proc').glob('[0-9]*'):
                 try:
                     words = (entry / 'cmdline').read_bytes().decode().split('\0')
                     status = (entry / 'status').read_text()
                     tasks = [task.read_text() for task in entry.glob('task/*/schedstat')]
+                    node = [Path(word).name for word in words if f'{ROOT}/install/maglev_' in word]
+                    seldom = looks % 10 == 0  # it walks all pages of a node
+                    rollup = (entry / 'smaps_rollup').read_text() if node and seldom else ''
                 except (OSError, UnicodeDecodeError):
                     continue
-                node = [Path(word).name for word in words if f'{ROOT}/install/maglev_' in word]
-                peak = [line.split()[1] for line in status.splitlines() if 'VmHWM' in line]
-                if node and peak and node[0] != 'analyze':
-                    self.peak[node[0]] = max(self.peak.get(node[0], 0.0), int(peak[0]) / 1024)
+                if node and node[0] != 'analyze':
+                    self._most(self.peak, node[0], status, 'VmHWM:')
+                    self._most(self.share, node[0], rollup, 'Pss:')
                     spent = 1e-9 * sum(int(task.split()[0]) for task in tasks)
                     self.spent.setdefault(node[0], []).append((time.time(), spent))
+
+    def _most(self, most: dict[str, float], node: str, text: str, name: str) -> None:
+        for line in text.splitlines():
+            if line.startswith(name):
+                most[node] = max(most.get(node, 0.0), int(line.split()[1]) / 1024)
 
     def by_tick(self, clock: FloatArray) -> dict[str, float]:
         """CPU time of each node in a tick [s], of the ticks at ``clock`` (n,) [s since the epoch].
@@ -182,7 +192,9 @@ def main() -> int:
     starting, spent = [run.starting for run in runs], [run.spent for run in runs]
     print('CPU time until it levitates [ms]: ' + _by_node(starting, 1e3))
     print('CPU time in a tick [us]: ' + _by_node(spent, 1e6))
-    print('peak memory [MB]: ' + ', '.join(f'{n} {mb:.0f}' for n, mb in watch.peak.items()))
+    for name, memory in (('resident', watch.peak), ('with shared pages in parts', watch.share)):
+        by_node = ', '.join(f'{node} {size:.0f}' for node, size in memory.items())
+        print(f'peak memory, {name} [MB]: {by_node}')
     kept = (
         min(by_default, by_events) <= LARGEST_RATIO
         and factor >= LEAST_FACTOR
