@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from types import SimpleNamespace
@@ -112,6 +114,27 @@ def test_a_node_that_waits_is_ended_by_a_second_signal_and_by_no_first() -> None
     node = Node(send(signal.SIGINT, signal.SIGINT), lambda: False)
     assert run(node) == 0
     assert node.happened == ['asked', 'closed', 'destroyed']
+
+
+def test_a_middleware_that_blocks_does_not_keep_the_process() -> None:
+    program = (
+        'import ctypes\n'
+        'from maglev_node import node, process\n'
+        'class Stuck(node.MaglevNode):\n'
+        '    def __init__(self): super().__init__("stuck", node.NodeParameters)\n'
+        '    def spin(self, stop): pass\n'
+        '    def close(self): print("closed", flush=True)\n'
+        '    def destroy_node(self): ctypes.PyDLL(None).sleep(60)\n'  # and holds the interpreter
+        'process._LEAVING_TIME = 0.2\n'
+        'process.main(Stuck, "stuck")\n'
+    )
+    done = subprocess.run(
+        [sys.executable, '-c', program], capture_output=True, text=True, timeout=30, check=False
+    )
+    assert done.returncode == 1
+    assert done.stdout == 'closed\n'
+    assert 'Timeout' in done.stderr
+    assert 'in destroy_node' in done.stderr
 
 
 def test_a_hang_up_that_is_ignored_stays_ignored() -> None:

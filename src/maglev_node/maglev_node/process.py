@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import faulthandler
 import gc
 import os
 import signal
@@ -23,6 +24,9 @@ from maglev_node.usage import usage
 
 _DELIVERY_TIME = 0.5
 """Longest wait at the end for readers to have what was published [s]."""
+
+_LEAVING_TIME = 5.0
+"""Longest for a node that has closed to leave the graph [s]."""
 
 _BACKGROUND_NICENESS = 5
 
@@ -108,11 +112,18 @@ def _is_user_error(error: Exception) -> bool:
 
 
 def _close(node: MaglevNode[Any] | None) -> None:
+    """The node's last work, then out of the graph: a middleware that blocks is left after a bound.
+
+    Which is exit code 1, with the threads' tracebacks on stderr.
+    """
     if node is not None:
         node.close()
+    faulthandler.dump_traceback_later(_LEAVING_TIME, exit=True)
+    if node is not None:
         _deliver(node)
         node.destroy_node()
     rclpy.try_shutdown()
+    faulthandler.cancel_dump_traceback_later()
 
 
 def _deliver(node: Node) -> None:
