@@ -198,3 +198,15 @@ def test_no_current_may_be_asked_for_where_the_encoders_have_it_on_the_stop(
     fault = flight.stage.fault
     assert (fault is not None and 'zero currents' in str(fault)) == refused
     assert flight.stage.flying == refused
+
+
+@pytest.mark.parametrize(('rate', 'refused'), [(3.1e-3, False), (2e-2, True)])
+def test_a_count_of_coarse_encoders_on_the_stop_is_no_flight(rate: float, *, refused: bool) -> None:
+    flight = Flight(hover(LOWER_STOP))
+    flight.run(30)
+    assert flight.stage.flying
+    flight.stage.read()
+    flight.stage.guard.arrays.rate[0] = -rate
+    flight.stage.write(np.zeros(4), np.zeros(4))
+    assert ('zero currents' in str(flight.stage.fault)) == refused
+    assert flight.stage.flying == refused
