@@ -21,8 +21,8 @@ from flight import (
 )
 from graph import Nodes, Observer, Process
 
-from maglev_msgs.msg import ControllerState, Reference
-from maglev_node.topics import CONTROLLER_STATE, MEASUREMENT, REFERENCE, reference_qos
+from maglev_msgs.msg import ControllerState, Measurement, Reference
+from maglev_node.topics import CONTROLLER_STATE, MEASUREMENT, REFERENCE, reference_qos, sample_qos
 
 
 def errors_on_time(observer: Observer, first: int) -> np.ndarray:
@@ -125,6 +125,28 @@ def test_in_flight_one_reference_is_followed(nodes: Nodes, watching: Observer) -
     assert {message.mode for message in flown} == {ControllerState.REGULATING}
     assert np.max(np.abs([message.error[:3] for message in flown])) < 50e-6
     watching.node.destroy_publisher(second)
+
+
+def test_what_a_second_stage_repeats_does_not_stop_the_flight(
+    nodes: Nodes, watching: Observer
+) -> None:
+    """It covers what the stage measured last, for a reference that looks seldom."""
+    graph = fly(nodes, LONG, 'poll_period:=0.05')
+    watching.wait(lambda: airborne(watching))
+    time.sleep(5.0)  # while it is young, a stage leaves where there is another
+    second = watching.node.create_publisher(Measurement, MEASUREMENT, sample_qos())
+    gap = [LOWER_STOP] * 4
+    end = time.monotonic() + 2.0
+    while time.monotonic() < end:
+        second.publish(Measurement(sequence=0, gap=gap, lockstep=True))
+        time.sleep(0.01)
+    watching.node.destroy_publisher(second)
+    watching.serve(0.5)
+    begin = max(message.sequence for message in watching.look()[MEASUREMENT])
+    watching.wait(lambda: watching.newest(CONTROLLER_STATE).sequence > begin + 500, timeout=5.0)
+    flown = [m for m in watching.look()[CONTROLLER_STATE] if m.sequence > begin]
+    assert {message.mode for message in flown} == {ControllerState.REGULATING}
+    assert 'began anew' not in graph['controller'].output
 
 
 @pytest.mark.alone

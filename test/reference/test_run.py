@@ -48,6 +48,17 @@ def test_it_begins_at_the_newest_sample_and_stays_ahead():
         np.testing.assert_array_equal(values, expected)
 
 
+@pytest.mark.parametrize(('answered', 'due'), [(1063, 63), (1005, 5), (1064, 0), (9, 0)])
+def test_an_answered_sample_counts_though_its_measurement_was_not_seen(answered, due):
+    """Beyond what was published none can be answered: that is another stage's."""
+    run = run_at(1000)
+    run.due()
+    run.observe_controller(Mode.REGULATING, answered)
+    block = run.due()
+    assert (0 if block is None else len(block[1].phase)) == due
+    assert run.newest == 1000
+
+
 def test_after_a_gap_it_catches_up_in_bursts():
     run = run_at(0)
     run.due()

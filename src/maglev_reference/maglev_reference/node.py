@@ -252,7 +252,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         period = round(1e9 * self.parameters.sample_time)
         for row in range(len(block.phase)):
             message.sequence = first + row
-            ahead = first + row - self._run.newest
+            ahead = first + row - self._measured.sequence
             set_stamp(message.header.stamp, stage_time + ahead * period)
             message.phase = int(block.phase[row])
             message.segment = int(block.segment[row])

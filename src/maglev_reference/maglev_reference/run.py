@@ -148,7 +148,7 @@ class ReferenceRun:
         """
         if self._timeline is None:
             return None
-        wanted = self.newest + (1 if slowly else self._lead) - self._origin
+        wanted = self._reached + (1 if slowly else self._lead) - self._origin
         if self.controller is None:
             wanted = min(wanted, self._timeline.segments[0].last + 1)
         count = min(wanted - self._next, _BURST)
@@ -157,6 +157,16 @@ class ReferenceRun:
         first = self._next
         self._next += count
         return self._origin + first, self._timeline.block(first, count)
+
+    @property
+    def _reached(self) -> int:
+        """The newest sample there is, be it the controller that tells of it.
+
+        In lockstep the loop would wait for ever for what follows a measurement that another stage's
+        has covered.
+        """
+        published = self._answered < self._origin + self._next
+        return max(self.newest, self._answered) if published else self.newest
 
     def enter_phase(self) -> bool:
         """Bring ``phase`` to the stage's newest sample; returns whether it is another one now."""
