@@ -72,7 +72,8 @@ class Process:
     def signal(self, number: signal.Signals) -> None:
         """Send a signal to the process, if it still runs."""
         if self.running:
-            os.kill(self.pid, number)
+            with contextlib.suppress(ProcessLookupError):  # it may have ended since
+                os.kill(self.pid, number)
 
     @property
     def running(self) -> bool:
