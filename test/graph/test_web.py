@@ -49,8 +49,8 @@ def test_the_page_shows_the_flight_and_its_buttons_act(flying: Process, watching
         page.wait(lambda: 'controller regulating' in page.text() and 'motor 4' in page.text())
 
         page.press('Emergency stop')
-        watching.wait(lambda: mode(watching) == ControllerState.FAULT)
-        watching.wait(lambda: landed_without_current(watching))
+        page.wait(lambda: mode(watching) == ControllerState.FAULT)
+        page.wait(lambda: landed_without_current(watching))
         page.wait(lambda: '<b>controller</b>: FAULT' in page.text())
         with PageClient(address(flying), origin='https://elsewhere.example') as stranger:
             stranger.wait(lambda: stranger.buttons())
@@ -58,18 +58,33 @@ def test_the_page_shows_the_flight_and_its_buttons_act(flying: Process, watching
             stranger.wait(lambda: 'refused: this page' in stranger.text())
             assert mode(watching) == ControllerState.FAULT
         page.press('Reset')
-        watching.wait(lambda: mode(watching) == ControllerState.DISABLED)
+        page.wait(lambda: mode(watching) == ControllerState.DISABLED)
         page.press('Enable')
-        watching.wait(lambda: mode(watching) == ControllerState.WAITING)
+        page.wait(lambda: mode(watching) == ControllerState.WAITING)
         page.press('Step')
         refusal = '/reference/step: step refused: the reference does not hover'
         page.wait(lambda: refusal in page.text())
         page.press('Lift off')
-        watching.wait(lambda: airborne(watching))
+        page.wait(lambda: airborne(watching))
     flying.signal(signal.SIGKILL)
     assert flying.wait() == 137
     samples(watching, 500)
     assert mode(watching) == ControllerState.REGULATING
+
+
+def test_an_emergency_stop_before_the_view_knows_any_node_lands_the_platen(
+    nodes: Nodes, watching: Observer
+) -> None:
+    fly(nodes, LONG)
+    watching.wait(lambda: airborne(watching))
+    web = nodes.start('web', 'port:=0')
+    web.wait_for('live view: ')
+    with PageClient(address(web), origin=address(web)) as page:
+        page.wait(lambda: 'Emergency stop' in page.buttons())
+        page.press('Emergency stop')
+        page.wait(lambda: '/controller/emergency_stop: ' in page.text())
+        page.wait(lambda: landed_without_current(watching))
+        assert mode(watching) == ControllerState.FAULT
 
 
 def test_the_fields_of_the_page_go_with_its_step() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import socket
 import time
 from collections.abc import Callable, Iterable
@@ -61,7 +62,7 @@ class PageClient:
         """Read until something holds; what it is."""
         deadline = time.monotonic() + timeout
         while not (found := condition()):
-            assert time.monotonic() < deadline, 'it never held'
+            assert time.monotonic() < deadline, f'it never held; the page says:\n{self.text()}'
             self.read(0.05)
         return found
 
@@ -89,7 +90,8 @@ class PageClient:
 
     def close(self) -> None:
         """Leave without a word, as a browser that is killed."""
-        self._socket.socket.shutdown(socket.SHUT_RDWR)
+        with contextlib.suppress(OSError):  # it has ended by itself
+            self._socket.socket.shutdown(socket.SHUT_RDWR)
         self._socket.recv_events_thread.join(10)
         self._socket.socket.close()
 

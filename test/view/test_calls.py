@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
@@ -40,10 +41,13 @@ class Graph:
     def __init__(self) -> None:
         self.services: dict[str, Service] = {}
         self.said: list[str] = []
+        self.known = True
         self.operator = Operator(self, self.said.append)  # type: ignore[arg-type]
         self.operator.look()
 
     def get_publishers_info_by_topic(self, topic: str) -> list[Any]:
+        if not self.known:
+            return []
         return [SimpleNamespace(node_namespace='/lab', node_name=NODES[topic])]
 
     def create_client(self, _kind: Any, name: str) -> Service:
@@ -56,6 +60,17 @@ class Graph:
 @pytest.fixture
 def graph() -> Graph:
     return Graph()
+
+
+@pytest.fixture
+def wait(monkeypatch: pytest.MonkeyPatch) -> Callable[[float], None]:
+    """Lets time pass [s]."""
+
+    def passes(duration: float) -> None:
+        now = time.monotonic() + duration
+        monkeypatch.setattr(time, 'monotonic', lambda: now)
+
+    return passes
 
 
 def test_every_button_has_its_services() -> None:
@@ -72,18 +87,18 @@ def test_an_emergency_stop_is_the_controllers(graph: Graph) -> None:
 
 @pytest.mark.parametrize('how', ['silent', 'refused', 'gone'])
 def test_where_the_controller_does_not_stop_the_stage_does(
-    graph: Graph, how: str, monkeypatch: pytest.MonkeyPatch
+    graph: Graph, how: str, wait: Callable[[float], None]
 ) -> None:
     controller = graph.services['/lab/controller/emergency_stop']
     controller.ready = how != 'gone'
     graph.operator.ask('Emergency stop', {})
     if how == 'refused':
         controller.answer(False, 'it flies nothing')
-    elif how == 'silent':
+    else:
+        wait(0.4)
         graph.operator.go_on()
         assert '/lab/plant/emergency_stop' not in graph.called()
-        now = time.monotonic()
-        monkeypatch.setattr(time, 'monotonic', lambda: now + 0.6)
+        wait(0.2)
     graph.operator.go_on()
     assert '/lab/plant/emergency_stop' in graph.called()
     graph.services['/lab/plant/emergency_stop'].answer(True, 'currents cut')
@@ -115,9 +130,43 @@ def test_a_step_is_of_the_axis_and_the_distance_that_were_chosen(graph: Graph) -
     assert graph.said[-1] == '/lab/reference/step: step refused: z is 0.06 m'
 
 
-def test_what_nobody_offers_is_said(graph: Graph) -> None:
+def test_what_nobody_offers_is_said_and_not_called_when_it_comes_later(
+    graph: Graph, wait: Callable[[float], None]
+) -> None:
     for service in graph.services.values():
         service.ready = False
     graph.operator.ask('Lift off', {})
     graph.operator.go_on()
+    assert graph.said == ['Lift off …']
+    wait(1.1)
+    graph.operator.go_on()
     assert graph.said[-1] == f'nobody offers lift_off beside {REFERENCE}'
+    graph.services['/lab/reference/lift_off'].ready = True
+    graph.operator.go_on()
+    assert graph.called() == set()
+
+
+def test_who_clicks_before_the_nodes_are_known_is_obeyed_once_they_are() -> None:
+    graph = Graph()
+    graph.known, graph.operator = False, Operator(graph, graph.said.append)  # type: ignore[arg-type]
+    graph.operator.ask('Emergency stop', {})
+    graph.operator.go_on()
+    assert graph.called() == set()
+    graph.known = True
+    graph.operator.go_on()
+    assert graph.called() == {'/lab/controller/emergency_stop'}
+
+
+def test_an_emergency_stop_of_the_stage_is_sought_for_long(
+    graph: Graph, wait: Callable[[float], None]
+) -> None:
+    for service in graph.services.values():
+        service.ready = False
+    graph.operator.ask('Emergency stop', {})
+    wait(0.6)
+    graph.operator.go_on()
+    wait(9.0)
+    graph.operator.go_on()
+    graph.services['/lab/plant/emergency_stop'].ready = True
+    graph.operator.go_on()
+    assert graph.called() == {'/lab/plant/emergency_stop'}

@@ -14,10 +14,16 @@ from maglev_node.topics import CURRENTS, MEASUREMENT, REFERENCE
 
 
 class Call(NamedTuple):
-    """A service of the node that publishes a topic, and how long its answer is waited for [s]."""
+    """A service of the node that publishes a topic.
+
+    It is sought for some time [s], since a view that has just come up does not know everybody yet;
+    short, or a lift-off would come when nobody thinks of it any more. Then its answer is waited for
+    with some patience [s].
+    """
 
     topic: str
     service: str
+    sought: float = 1.0
     patience: float = 10.0
 
     @property
@@ -39,7 +45,10 @@ WISHES = {
     'Land': Wish((Call(REFERENCE, 'land'),)),
     # The controller lands the platen; the stage, which may only cut the currents, comes second.
     'Emergency stop': Wish(
-        (Call(CURRENTS, 'emergency_stop', 0.5), Call(MEASUREMENT, 'emergency_stop')),
+        (
+            Call(CURRENTS, 'emergency_stop', sought=0.5, patience=0.5),
+            Call(MEASUREMENT, 'emergency_stop', sought=10.0),
+        ),
         one_is_enough=True,
     ),
     'Reset': Wish((Call(MEASUREMENT, 'reset'), Call(CURRENTS, 'reset'))),
@@ -80,6 +89,8 @@ class Operator:
 
     def go_on(self) -> None:
         """Take the answers that have come and make the next calls."""
+        if any(errand.seeks for errand in self._errands):
+            self.look()
         for errand in self._errands:
             errand.go_on()
             if errand.over:
@@ -90,39 +101,55 @@ class Operator:
 class _Errand:
     """A wish on its way."""
 
-    def __init__(self, wish: Wish, clients: dict[Call, Any]) -> None:
+    def __init__(self, wish: Wish, clients: Mapping[Call, Any]) -> None:
         self._wish, self._left, self._clients = wish, list(wish.calls), clients
+        self._client: Any = None
         self._future: Any = None
-        self._name, self._deadline = '', 0.0
+        self._deadline = 0.0
         self.said: list[str] = []
         self.over = False
         self._next()
 
+    @property
+    def seeks(self) -> bool:
+        """Whether the service to be called is not there yet."""
+        return not self.over and self._future is None
+
     def go_on(self) -> None:
-        if self._future is None:
+        if self.seeks:
+            self._seek()
+        elif not self.over:
+            self._await()
+
+    def _next(self) -> None:
+        """Turn to the next call, if there is one left."""
+        self._future = None
+        if not self._left:
+            self.over = True
             return
+        self._call = self._left.pop(0)
+        self._deadline = time.monotonic() + self._call.sought
+        self._seek()
+
+    def _seek(self) -> None:
+        call, client = self._call, self._clients.get(self._call)
+        if client is not None and client.service_is_ready():
+            request = call.kind.Request()
+            for name, value in self._wish.values.items():
+                setattr(request, name, value)
+            self._deadline = time.monotonic() + call.patience
+            self._client, self._future = client, client.call_async(request)
+        elif time.monotonic() > self._deadline:
+            self._end(f'nobody offers {call.service} beside {call.topic}', success=False)
+
+    def _await(self) -> None:
+        name = self._client.srv_name
         if self._future.done():
             answer = self._future.result()
             words = answer.message or ('done' if answer.success else 'refused')
-            self._end(f'{self._name}: {words}', success=bool(answer.success))
+            self._end(f'{name}: {words}', success=bool(answer.success))
         elif time.monotonic() > self._deadline:
-            self._end(f'{self._name} does not answer', success=False)
-
-    def _next(self) -> None:
-        """Make the next call, if there is one left."""
-        if not self._left:
-            self.over, self._future = True, None
-            return
-        call = self._left.pop(0)
-        client = self._clients.get(call)
-        if client is None or not client.service_is_ready():
-            self._end(f'nobody offers {call.service} beside {call.topic}', success=False)
-            return
-        request = call.kind.Request()
-        for name, value in self._wish.values.items():
-            setattr(request, name, value)
-        self._name, self._deadline = client.srv_name, time.monotonic() + call.patience
-        self._future = client.call_async(request)
+            self._end(f'{name} does not answer', success=False)
 
     def _end(self, text: str, *, success: bool) -> None:
         self.said.append(text)
