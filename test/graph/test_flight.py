@@ -120,7 +120,7 @@ def test_in_flight_one_reference_is_followed(nodes: Nodes, watching: Observer) -
         second.publish(stray)
         assert stray.sequence < begin + 20_000
         time.sleep(1e-3)
-    samples(watching, 500)
+    watching.wait(lambda: watching.newest(CONTROLLER_STATE).sequence > begin + 500)
     flown = [m for m in watching.look()[CONTROLLER_STATE] if m.sequence > begin]
     assert {message.mode for message in flown} == {ControllerState.REGULATING}
     assert np.max(np.abs([message.error[:3] for message in flown])) < 50e-6
