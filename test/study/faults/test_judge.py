@@ -114,6 +114,16 @@ def test_2_a_cut_that_is_foretold_too_mildly(flown: Flown, monkeypatch: pytest.M
     assert 2 in broken(verdict)
 
 
+def test_2_a_cut_is_judged_by_the_hardest_stop_of_its_fall() -> None:
+    """A tilting platen taps the lower stop with its edge, then the magnets lift it."""
+    judge = Judge(Flight(machine(0), programme(0)))
+    judge._state[0] = 0.0
+    judge._state[0, [0, 1, 8, 9]] = 0.03086, -0.044, 0.77e-3, 0.25
+    assert judge._fall_from(0) > 0.3
+    judge._state[0, [8, 9]] = 0.0
+    assert 0.0 < judge._fall_from(0) < 0.05
+
+
 def test_3_outputs_left_on(flown: Flown, monkeypatch: pytest.MonkeyPatch) -> None:
     def cut(self: Amplifiers) -> Any:
         return self.arrays.volts

@@ -294,7 +294,10 @@ class Judge:
         return worst
 
     def _fall_from(self, index: int) -> float:
-        """What a cut at a sample of the log would give [m/s], by the world's own physics."""
+        """What a cut at a sample of the log would give [m/s], by the world's own physics.
+
+        Whose edge taps the lower stop may yet be tilted so far that the magnets lift it.
+        """
         rig: Rig = self.flight.world.rig
         saved = rig.arrays.block.copy(), rig.stage.block.copy()
         rig.stage.state[:] = self._state[index]
@@ -303,8 +306,6 @@ class Judge:
         rest = np.array(self.flight.parameters.emulation.wiring.offset)
         for _ in range(_FALL):
             rig.advance(rest)
-            if rig.impact > 0.0:
-                break
         speed = rig.impact
         rig.arrays.block[:], rig.stage.block[:] = saved
         return speed
