@@ -253,6 +253,22 @@ def test_all_gaps_frozen_in_motion_are_found_within_30_ms_and_cut() -> None:
     assert not np.any(flight.boards.volts)
 
 
+def test_what_fails_during_a_landing_is_named_once_beside_what_it_lands_for() -> None:
+    flight = airborne(descending)
+    flight.stage.stop()
+    flight.run(20)
+    flight.boards.stuck[2] = True
+    landed(flight, NOMINAL)
+    fault = flight.stage.fault
+    assert fault is not None
+    assert fault.kind == 'stop'
+    first, *others = fault.reason.split('; then ')
+    assert first == 'emergency stop'
+    assert sum(other.startswith('encoder gap 3 is stuck') for other in others) == 1
+    assert len(others) == len({other.split(' by ')[0] for other in others})
+    assert 'check its cable' in fault.remedy
+
+
 def test_a_third_gap_during_the_landing_is_landed_and_the_fourth_cut() -> None:
     flight = airborne(descending)
     flight.boards.stuck[0] = True

@@ -59,6 +59,7 @@ class BridgeStage(StageLife):
         self._stale_samples = round(self.parameters.fault.stale / self.sample_time)
         self._longest_stop = round(self.parameters.boards.stop_time / self.sample_time)
         self._landing_samples = 0
+        self._named: set[tuple[int, ...]] = set()  # what the fault latched says of sensing
         self._still_samples = 0  # that the platen has stood still near its lower stop,
         self._still_at = 0.0  # and where [m]
         self._rests = False  # has rested there since current flowed last
@@ -311,6 +312,7 @@ class BridgeStage(StageLife):
                 reason = f'{self.fault.reason}; then {reason}'
                 remedy = f'{self.fault.remedy}; {remedy}'
         self.fault = Fault(kind, reason, remedy, cut)
+        self._named.clear()
         self.why = kind
         if self.mode is Mode.FOLLOWING:
             self._begin_landing()
@@ -331,18 +333,30 @@ class BridgeStage(StageLife):
         return set(impacts) == {'lower'} and impacts['lower'] < _SOFT
 
     def _sensing_fault(self, code: int, index: int) -> None:
+        lands_for = self.fault if self.mode is Mode.LANDING else None
         if code in (guard.RANGE, guard.GAP_RANGE):
             if self.mode is Mode.LANDING:  # is on its way out of there
                 return
             self._raise_fault('range', *faults.range_fault(code, index, self.guard))
         elif code == guard.MOTORS:
-            self._raise_fault('current', *faults.motor_fault(index, self.guard))
+            why = faults.motor_fault(index, self.guard)
+            self._raise_fault('current', *why)
+            self._name_too(lands_for, (code, index), *why)
         else:
-            reason, remedy = faults.encoder_fault(code, self.guard)
+            why = faults.encoder_fault(code, self.guard)
             blind = self.guard.blind
-            self._raise_fault('encoder', reason, remedy, cut=bool(blind[0]))
+            self._raise_fault('encoder', *why, cut=bool(blind[0]))
+            self._name_too(lands_for, (code, *self.guard.blamed), *why)
             if self.mode is Mode.LANDING and code != guard.RESIDUAL and blind.any():
                 self._begin_landing()
+
+    def _name_too(self, fault: Fault | None, what: tuple[int, ...], why: str, remedy: str) -> None:
+        """Add to the fault that it lands for what else is found out meanwhile, once."""
+        if self.fault is fault is not None and what not in self._named:
+            self.fault = fault._replace(
+                reason=f'{fault.reason}; then {why}', remedy=f'{fault.remedy}; {remedy}'
+            )
+        self._named.add(what)
 
     def _late(self) -> None:
         self.late_ticks += 1
