@@ -58,7 +58,9 @@ class Graph:
 
 
 @pytest.fixture
-def graph() -> Graph:
+def graph(monkeypatch: pytest.MonkeyPatch) -> Graph:
+    """Where the operator has been for long."""
+    monkeypatch.setattr('maglev_view.web.calls._DISCOVERY', 0.0)
     return Graph()
 
 
@@ -146,15 +148,32 @@ def test_what_nobody_offers_is_said_and_not_called_when_it_comes_later(
     assert graph.called() == set()
 
 
-def test_who_clicks_before_the_nodes_are_known_is_obeyed_once_they_are() -> None:
+def test_who_clicks_before_the_nodes_are_known_is_obeyed_once_they_are(
+    wait: Callable[[float], None],
+) -> None:
     graph = Graph()
     graph.known, graph.operator = False, Operator(graph, graph.said.append)  # type: ignore[arg-type]
     graph.operator.ask('Emergency stop', {})
+    wait(4.9)
     graph.operator.go_on()
     assert graph.called() == set()
     graph.known = True
     graph.operator.go_on()
     assert graph.called() == {'/lab/controller/emergency_stop'}
+
+
+def test_who_has_just_come_up_waits_for_the_controller_before_it_calls_the_stage(
+    wait: Callable[[float], None],
+) -> None:
+    graph = Graph()
+    graph.services['/lab/controller/emergency_stop'].ready = False
+    graph.operator.ask('Emergency stop', {})
+    wait(4.9)
+    graph.operator.go_on()
+    assert graph.called() == set()
+    wait(0.2)
+    graph.operator.go_on()
+    assert graph.called() == {'/lab/plant/emergency_stop'}
 
 
 def test_an_emergency_stop_of_the_stage_is_sought_for_long(

@@ -58,8 +58,15 @@ WISHES = {
 """By the buttons' labels."""
 
 
+_DISCOVERY = 5.0
+"""In which who has just joined a graph has found everybody, also on a busy machine [s]."""
+
+
 class Operator:
     """Calls services for whoever clicks; :meth:`look` and :meth:`go_on` are to be called often.
+
+    Who is not found is sought for longer while it has just come up itself: the stage's stop is
+    second best, and its turn would come too soon.
 
     :param tell: takes what came of it, as a text.
     """
@@ -68,6 +75,7 @@ class Operator:
         self._node, self._tell = node, tell
         self._clients: dict[Call, Any] = {}
         self._errands: list[_Errand] = []
+        self._acquainted = time.monotonic() + _DISCOVERY
 
     def look(self) -> None:
         """Find the nodes, so that their services know us before they are called."""
@@ -85,7 +93,7 @@ class Operator:
         self._tell(f'{wish} …')
         known = WISHES[wish]
         wanted = known._replace(values={**known.values, **values})
-        self._errands.append(_Errand(wanted, self._clients))
+        self._errands.append(_Errand(wanted, self._clients, self._acquainted))
 
     def go_on(self) -> None:
         """Take the answers that have come and make the next calls."""
@@ -101,8 +109,9 @@ class Operator:
 class _Errand:
     """A wish on its way."""
 
-    def __init__(self, wish: Wish, clients: Mapping[Call, Any]) -> None:
+    def __init__(self, wish: Wish, clients: Mapping[Call, Any], acquainted: float) -> None:
         self._wish, self._left, self._clients = wish, list(wish.calls), clients
+        self._acquainted = acquainted
         self._client: Any = None
         self._future: Any = None
         self._deadline = 0.0
@@ -128,7 +137,7 @@ class _Errand:
             self.over = True
             return
         self._call = self._left.pop(0)
-        self._deadline = time.monotonic() + self._call.sought
+        self._deadline = max(time.monotonic() + self._call.sought, self._acquainted)
         self._seek()
 
     def _seek(self) -> None:
