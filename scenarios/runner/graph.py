@@ -10,13 +10,14 @@ from typing import NamedTuple
 from runner.overlays import PARAMS
 from runner.process import program
 
-START_ORDER = ('recorder', 'monitor', 'stage', 'controller', 'reference')
-STOP_ORDER = ('reference', 'controller', 'stage', 'monitor', 'recorder')
-"""First no current flows, then the stage ends, then who watches."""
+START_ORDER = ('watchers', 'stage', 'controller', 'reference')
+STOP_ORDER = tuple(reversed(START_ORDER))
+"""First no current flows, then the stage ends, then who watches: recorder and monitor."""
 VIEWS = ('view', 'web')
 """Who only shows: they start last, end last, and the run does not depend on them."""
 
-_PACKAGES = {'recorder': 'maglev_monitor', 'web': 'maglev_view'}
+_WATCHERS = ('monitor', 'recorder')
+_PACKAGES = {'watchers': 'maglev_monitor', 'web': 'maglev_view'}
 
 
 class Scenario(NamedTuple):
@@ -56,8 +57,9 @@ class Flight(NamedTuple):
     def arguments(self, node: str) -> list[str]:
         """What a node is told: parameter files, each over the one before, then single values."""
         name = self._name(node)
+        nodes = _WATCHERS if name == 'watchers' else (name,)
         files = [
-            *(str(PARAMS / file) for file in ('machine.yaml', f'{name}.yaml')),
+            *(str(PARAMS / file) for file in ('machine.yaml', *(f'{each}.yaml' for each in nodes))),
             *(str(PARAMS / file) for file in self.scenario.files),
             *self.overlays,
         ]
@@ -67,8 +69,10 @@ class Flight(NamedTuple):
         for file in files:
             if Path(file).is_file():
                 arguments += ['--params-file', file]
-        for value in (f'effective_parameters:={self.out}/params/{name}.yaml', *self._values(node)):
-            arguments += ['-p', value]
+        for each in nodes:
+            own = f'effective_parameters:={self.out}/params/{each}.yaml'
+            for value in (own, *self._values(node if node == 'stage' else each)):
+                arguments += ['-p', f'{each}:{value}' if len(nodes) > 1 else value]
         return arguments
 
     def _name(self, node: str) -> str:
@@ -84,8 +88,8 @@ class Flight(NamedTuple):
         if node == 'monitor':
             output = f'output:={self.out}/metrics.json'
             scenario = f'scenario:={self.scenario.name}'
-            return ['exit_at_end:=true', output, scenario, f'stage:={self.stage}', mode]
-        values = [mode, "watchers:=['monitor','recorder']"]
+            return ['exit_at_end:=false', output, scenario, f'stage:={self.stage}', mode]
+        values = [mode, f'watchers:=[{",".join(map(repr, _WATCHERS))}]']
         if node == 'reference':
             values += ['autostart:=true', 'exit_at_end:=false']
             if self.mode == 'realtime':

@@ -10,6 +10,7 @@ from runner.console import complain, say
 from runner.process import NOT_OURS, last_words
 
 _LOGGED = re.compile(r'(WARN|ERROR|FATAL) \S+ (.*)')  # as ENVIRONMENT has nodes write it
+_QUIET = re.compile(r'(INFO|DEBUG) \d')  # which stays in the log
 _SEVERITY = {'WARN': 'warning', 'ERROR': 'error', 'FATAL': 'fatal error'}
 _MOST = 20  # warnings of a node
 
@@ -41,7 +42,7 @@ class NodeLog:
     """Shows a node's warnings and errors as they come, each text once.
 
     :param who: scenario and node, ``ellipse: controller``.
-    :param everything: show its other lines too, as they are.
+    :param everything: show too what it prints and does not log, as it is.
     """
 
     def __init__(self, who: str, path: Path, *, everything: bool = False) -> None:
@@ -55,7 +56,7 @@ class NodeLog:
             found = _LOGGED.fullmatch(line)
             if found:
                 self._warn(_text(found))
-            elif self._everything:
+            elif self._everything and not _QUIET.match(line):
                 say(line)
 
     def last_words(self) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from runner.console import GREEN, complain, say, write
 from runner.folder import make_folder, say_where
@@ -16,7 +17,7 @@ from runner.signals import Signals
 
 NO_VISER = 3
 """The exit code of ``replay`` where what it needs is no part of the set-up."""
-TALKERS = ('monitor', 'web')
+TALKERS = ('watchers', 'web')
 """Nodes of which the terminal shows everything."""
 
 
@@ -58,12 +59,17 @@ def fly(flight: Flight, signals: Signals) -> int:
 
 def outcome(flight: Flight, passed: bool) -> dict[str, object]:
     """What came of a flight, with the content of its metrics.json."""
-    try:
-        figures = json.loads((flight.out / 'metrics.json').read_text(encoding='utf-8'))
-    except (OSError, ValueError):
-        figures = None
     facts = {'scenario': flight.scenario.name, 'stage': flight.stage, 'mode': flight.mode}
-    return {**facts, 'out': str(flight.out), 'passed': passed, 'metrics': figures}
+    return {**facts, 'out': str(flight.out), 'passed': passed, 'metrics': figures(flight) or None}
+
+
+def figures(flight: Flight) -> dict[str, Any]:
+    """The content of a flight's metrics.json, empty where there is none."""
+    try:
+        found: dict[str, Any] = json.loads((flight.out / 'metrics.json').read_text('utf-8'))
+    except (OSError, ValueError):
+        return {}
+    return found
 
 
 class Run:
@@ -81,7 +87,7 @@ class Run:
         }
 
     def measure(self, commands: Mapping[str, Sequence[str]]) -> bool:
-        """Whether the nodes lived until the monitor came to its end, and no signal came before.
+        """Whether the nodes lived until the monitor had its figures, and no signal came before.
 
         Raises OSError when one cannot be started. However it goes, none lives on.
         """
@@ -104,21 +110,19 @@ class Run:
         if replay:
             self._replay(replay)
         reported = self._report(analyze)
-        return clean and reported and self._nodes['monitor'].code == 0
+        return clean and reported and figures(self._flight).get('verdict') == 'pass'
 
     def _watch(self) -> bool:
         while not self._signals.code:
             self._pause(0.1)
             ended = [node for node in START_ORDER if self._nodes[node].code is not None]
-            measured = (self._out / 'metrics.json').is_file()
-            early = [node for node in ended if node != 'monitor' or not measured]
-            for node in early:
+            for node in ended:
                 words = self._last_words(node)
                 code = self._nodes[node].code
                 self._complain(f'failed: {node} ended early with exit code {code}{words}')
                 self._complain(f'its log: {self._log(node)}')
-            if ended:
-                return not early
+            if ended or (self._out / 'metrics.json').is_file():
+                return not ended
             self._tell_of_views()
         return False
 
@@ -135,7 +139,7 @@ class Run:
         clean = True
         for node in STOP_ORDER:
             code = self._nodes[node].code
-            if node != 'monitor' and code != 0:
+            if code != 0:
                 words = self._last_words(node)
                 self._complain(f'failed: {node} did not end cleanly, exit code {code}{words}')
                 clean = False

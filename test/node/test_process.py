@@ -73,7 +73,7 @@ def send(*numbers: signal.Signals) -> Callable[[], None]:
 
 
 def run(node: Any) -> int:
-    return process.run(lambda: node, 'node')
+    return process.run('node', lambda: node)
 
 
 @pytest.mark.parametrize('number', ENDING)
@@ -126,7 +126,7 @@ def test_a_middleware_that_blocks_does_not_keep_the_process() -> None:
         '    def close(self): print("closed", flush=True)\n'
         '    def destroy_node(self): ctypes.PyDLL(None).sleep(60)\n'  # and holds the interpreter
         'process._LEAVING_TIME = 0.2\n'
-        'process.main(Stuck, "stuck")\n'
+        'process.main("stuck", Stuck)\n'
     )
     done = subprocess.run(
         [sys.executable, '-c', program], capture_output=True, text=True, timeout=30, check=False

@@ -8,6 +8,7 @@ from source_tree import PACKAGES, PURE, imported, modules, top_level
 NODES = {
     'maglev_controller.node',
     'maglev_monitor.bag.recorder',
+    'maglev_monitor.watchers',
     'maglev_monitor.live.node',
     'maglev_plant.node',
     'maglev_reference.node',

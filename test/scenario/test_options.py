@@ -21,13 +21,17 @@ def test_the_nodes_get_their_parameters(tree: Tree) -> None:
     for node in NODES:
         assert tree.files(node)[0] == 'params/machine.yaml'
         assert tree.files(node)[-3:] == over
-        assert f'effective_parameters:={tree.out}/params/{node}.yaml' in tree.arguments(node)
+        if node != 'watchers':
+            assert f'effective_parameters:={tree.out}/params/{node}.yaml' in tree.arguments(node)
     assert {'mode:=realtime', WATCHERS} <= set(tree.arguments('plant'))
     reference = tree.arguments('reference')
     assert {'duration:=3.0', 'autostart:=true', WATCHERS, 'lead:=128'} <= set(reference)
-    monitor = tree.arguments('monitor')
-    assert {f'output:={tree.out}/metrics.json', 'scenario:=ellipse', 'stage:=plant'} <= set(monitor)
-    assert f'output:={tree.out}/bag' in tree.arguments('recorder')
+    watchers = tree.arguments('watchers')
+    assert {
+        *(f'monitor:output:={tree.out}/metrics.json', f'recorder:output:={tree.out}/bag'),
+        *('monitor:scenario:=ellipse', 'monitor:stage:=plant', 'monitor:mode:=realtime'),
+        *(f'{w}:effective_parameters:={tree.out}/params/{w}.yaml' for w in ('monitor', 'recorder')),
+    } <= set(watchers)
 
 
 def test_without_a_machine_file_each_node_starts_with_its_own(tree: Tree) -> None:

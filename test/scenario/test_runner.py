@@ -41,15 +41,16 @@ def test_a_run_that_passes(tree: Tree) -> None:
     code, output = tree.run()
     assert code == 0, output
     assert 'y 3.0 um' in output  # what the monitor says is seen
+    assert 'recording' not in output  # not what is only logged
     assert 'ellipse: passed' in output
     for name in ('report.html', 'metrics.json', 'log'):
         assert f'{tree.out}/{name}' in output
-    assert tree.ended() == ['reference', 'controller', 'plant', 'recorder', 'view']
+    assert tree.ended() == ['reference', 'controller', 'plant', 'watchers', 'view']
     assert tree.alive() == []
 
 
 def test_a_run_outside_its_limits_still_has_its_report(tree: Tree) -> None:
-    tree.behave('monitor', '1')
+    tree.behave('watchers', 'miss')
     code, output = tree.run()
     assert code == 1
     assert 'FAILED' in output
@@ -64,9 +65,9 @@ def test_a_run_without_a_report_fails(tree: Tree) -> None:
     assert 'ellipse: failed: no report: error: no bag\nellipse: FAILED' in output
 
 
-@pytest.mark.parametrize('node', ['plant', 'controller', 'reference', 'recorder', 'monitor'])
+@pytest.mark.parametrize('node', ['plant', 'controller', 'reference', 'watchers'])
 def test_a_node_that_dies_ends_the_run(tree: Tree, node: str) -> None:
-    tree.behave('monitor', 'run')
+    tree.behave('watchers', 'run')
     tree.behave(node, 'die')
     code, output = tree.run()
     assert code == 1
@@ -77,7 +78,7 @@ def test_a_node_that_dies_ends_the_run(tree: Tree, node: str) -> None:
 
 
 def test_a_node_that_cannot_be_executed(tree: Tree) -> None:
-    tree.behave('monitor', 'run')
+    tree.behave('watchers', 'run')
     tree.executable('maglev_controller', 'controller', '#!/no/such/interpreter\n')
     code, output = tree.run()
     assert code == 1
@@ -95,13 +96,13 @@ def test_a_node_that_is_not_there_stops_before_the_start(tree: Tree) -> None:
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_stops_the_nodes_in_order(tree: Tree, number: signal.Signals) -> None:
-    tree.behave('monitor', 'run')
+    tree.behave('watchers', 'run')
     process = tree.start('--out', str(tree.out))
     tree.wait_started()
     process.send_signal(number)
     output, _ = process.communicate(timeout=20)
     assert process.returncode == 128 + number, output
-    assert tree.ended() == ['reference', 'controller', 'plant', 'monitor', 'recorder', 'view']
+    assert tree.ended() == ['reference', 'controller', 'plant', 'watchers', 'view']
     assert 'interrupted' in output
     assert tree.alive() == []
 
@@ -118,7 +119,7 @@ def test_a_signal_ends_the_analysis(tree: Tree) -> None:
 
 
 def test_killing_the_scenario_leaves_no_orphan(tree: Tree) -> None:
-    tree.behave('monitor', 'run')
+    tree.behave('watchers', 'run')
     process = tree.start('--out', str(tree.out))
     tree.wait_started()
     process.kill()
@@ -154,7 +155,7 @@ def test_ros2_run_is_used_where_it_is(tree: Tree) -> None:
     assert code == 0, output
     assert 'maglev_reference reference --ros-args' in (tree.path / 'ros2').read_text()
     assert 'this is not the node' not in output
-    assert tree.ended() == ['reference', 'controller', 'plant', 'recorder', 'view']
+    assert tree.ended() == ['reference', 'controller', 'plant', 'watchers', 'view']
     assert tree.alive() == []
 
 
@@ -186,7 +187,7 @@ def test_a_folder_that_holds_a_run_is_not_touched(tree: Tree) -> None:
 
 
 def test_an_interrupt_is_heeded_where_it_was_ignored(tree: Tree) -> None:
-    tree.behave('monitor', 'run')
+    tree.behave('watchers', 'run')
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         process = tree.start('--out', str(tree.out))
@@ -221,7 +222,7 @@ def test_without_setpriv_the_nodes_run_all_the_same(tree: Tree) -> None:
     code, output = tree.finish(*out, script='ellipse', path='/nowhere')
     assert code == 0, output
     tree.executable('maglev_controller', 'controller', '#!/no/such/interpreter\n')
-    tree.behave('monitor', 'run')
+    tree.behave('watchers', 'run')
     second = ('--out', str(tree.path / 'second'))
     code, output = tree.finish(*second, script='ellipse', path='/nowhere')
     assert code == 1
@@ -250,7 +251,7 @@ def test_a_program_that_leaves_a_child_is_ended_with_it(tmp_path: Path) -> None:
 def test_quietly_only_what_is_wrong_is_said(tree: Tree) -> None:
     assert tree.run('--quiet') == (0, '')
     assert (tree.out / 'report.html').exists()
-    tree.behave('monitor', '1')
+    tree.behave('watchers', 'miss')
     tree.behave('controller', 'warn')
     code, output = tree.finish('--out', f'{tree.out}-2', '--quiet', script='ellipse')
     assert code == 1

@@ -34,10 +34,10 @@ def tables(tree: Tree, *options: str) -> tuple[int, str]:
 def flown(tree: Tree) -> list[str]:
     """The runs that began, by their folders within ``out``."""
     return [
-        word.removeprefix(f'output:={tree.out}/').removesuffix('/bag')
-        for line in tree.history('recorder')
+        word.removeprefix(f'recorder:output:={tree.out}/').removesuffix('/bag')
+        for line in tree.history('watchers')
         for word in line.split()
-        if word.startswith('output:=')
+        if word.startswith('recorder:output:=')
     ]
 
 
@@ -87,7 +87,7 @@ def test_quick_runs_are_short(papers: Tree) -> None:
 
 
 def test_a_run_that_fails_does_not_stop_the_others(papers: Tree) -> None:
-    papers.behave('monitor@ellipse', '1')
+    papers.behave('watchers@ellipse', 'miss')
     code, output = tables(papers, '--json')
     failed = [run for run in ALL_RUNS if run.endswith('/ellipse')]
     assert code == 1
@@ -110,7 +110,7 @@ def test_a_page_that_fails_fails(papers: Tree) -> None:
 def test_a_signal_ends_the_run_in_progress_and_no_other_begins(
     papers: Tree, number: signal.Signals
 ) -> None:
-    papers.behave('monitor@ellipse', 'run')
+    papers.behave('watchers@ellipse', 'run')
     process = papers.start('--out', str(papers.out), script='paper_tables')
     while len(papers.history('reference')) < 2:
         assert process.poll() is None
@@ -180,15 +180,17 @@ def test_every_script_can_be_quiet_and_talk_to_programs(
     assert '\n  --json ' in usage
 
 
-@pytest.mark.parametrize(('verdict', 'parts'), [('0', ['steps', 'sinusoids']), ('1', ['steps'])])
+@pytest.mark.parametrize(
+    ('verdict', 'parts'), [('pass', ['steps', 'sinusoids']), ('miss', ['steps'])]
+)
 def test_the_single_motor_flies_its_second_part_when_the_first_passed(
     tree: Tree, verdict: str, parts: list[str]
 ) -> None:
     for name in ('single_motor', 'scenario_single_motor_steps', 'scenario_single_motor_sinusoids'):
         tree.parameters(f'params/{name}.yaml')
-    tree.behave('monitor@steps', verdict)
+    tree.behave('watchers@steps', verdict)
     code, output = tree.finish('--duration=2', f'--out={tree.out}', script='single_motor')
-    assert (code, flown(tree)) == (int(verdict), parts), output
+    assert (code, flown(tree)) == (int(verdict != 'pass'), parts), output
     assert tree.files('controller') == [
         'params/single_motor.yaml',
         f'params/scenario_single_motor_{parts[-1]}.yaml',

@@ -36,7 +36,7 @@ def test_warnings_of_every_node_are_shown_once(tree: Tree) -> None:
 
 
 def test_the_reason_of_an_early_end_is_said_once(tree: Tree) -> None:
-    tree.behave('monitor', 'run')
+    tree.behave('watchers', 'run')
     tree.behave('controller', 'fail')
     code, output = tree.run()
     assert code == 1
@@ -61,18 +61,18 @@ def test_what_the_monitor_logs_is_shown_like_that_of_others(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     log = tmp_path / 'log'
-    log.write_text('y 3.0 um\nWARN 1.0 no node of the run is seen\ny 3.0 um\n')
-    logs.NodeLog('ellipse: monitor', log, everything=True).show()
+    log.write_text('y 3.0 um\nINFO 1.0 recording\nWARN 1.0 no node of the run is seen\ny 3.0 um\n')
+    logs.NodeLog('ellipse: watchers', log, everything=True).show()
     captured = capsys.readouterr()
     assert captured.out == 'y 3.0 um\ny 3.0 um\n'
-    assert captured.err == 'ellipse: monitor: warning: no node of the run is seen\n'
+    assert captured.err == 'ellipse: watchers: warning: no node of the run is seen\n'
 
 
 def test_progress_is_shown_in_whole_lines(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     log = tmp_path / 'log'
-    progress = logs.NodeLog('ellipse: monitor', log, everything=True)
+    progress = logs.NodeLog('ellipse: watchers', log, everything=True)
     progress.show()
     shown = []
     for text in ('y 3.0', ' um\nx', ' 4\n[ros2run]: hm\n', 'last'):

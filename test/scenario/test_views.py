@@ -33,7 +33,7 @@ def test_what_is_started(tree: Tree, options: tuple[str, ...], expected: set[str
 
 @pytest.mark.parametrize('how', ['die', 'fail'])
 def test_a_view_that_dies_is_told_and_the_flight_goes_on(tree: Tree, how: str) -> None:
-    tree.behave('monitor', 'wait')
+    tree.behave('watchers', 'wait')
     tree.behave('view', how)
     process = tree.start('--out', str(tree.out))
     said = ''

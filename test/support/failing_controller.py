@@ -53,4 +53,4 @@ def _fail(step: Callable[..., None]) -> Callable[..., None]:
 if __name__ == '__main__':
     how = sys.argv[1]
     supervision.Supervisor.step = _fail(supervision.Supervisor.step)  # type: ignore[method-assign]
-    node.run_main(_Failing, 'controller')
+    node.run_main('controller', _Failing)

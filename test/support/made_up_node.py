@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from types import SimpleNamespace
 from typing import Any
 
+from rclpy.serialization import deserialize_message, serialize_message
 from rosgraph_msgs.msg import Clock
 
 from maglev_msgs.msg import Measurement
@@ -16,7 +17,8 @@ from maglev_node.stamp import nanoseconds, set_stamp
 class Topic:
     """A publisher; messages are noted by what tells them apart."""
 
-    def __init__(self) -> None:
+    def __init__(self, kind: type) -> None:
+        self._kind = kind
         self.sequences: list[int] = []
         self.newest: Any = None
         self.stamps: list[int] = []
@@ -26,6 +28,7 @@ class Topic:
         if isinstance(message, Clock):
             self.stamps.append(nanoseconds(message.clock))
             return
+        message = deserialize_message(message, self._kind)
         self.sequences.append(message.sequence)
         self.stamps.append(nanoseconds(message.header.stamp))
         self.stamp_of[message.sequence] = self.stamps[-1]
@@ -52,9 +55,11 @@ class Inbox:
         self.messages: list[Any] = []
         self._stamped = stamped
 
-    def take(self) -> Iterator[tuple[Any, int]]:
+    topic = '/stage/currents'
+
+    def take(self, _at_most: int) -> Iterator[tuple[bytes, int]]:
         waiting, self.messages = self.messages, []
-        return ((self._stamped(message), 0) for message in waiting)
+        return ((serialize_message(self._stamped(message)), 0) for message in waiting)
 
 
 class MadeUpNode:
@@ -80,13 +85,17 @@ class MadeUpNode:
         return [SimpleNamespace(node_name=name, node_namespace='/') for name in names]
 
     def create_publisher(self, message_type: type, _topic: str, _qos: Any) -> Topic:
-        return self.topics.setdefault(message_type, Topic())
+        return self.topics.setdefault(message_type, Topic(message_type))
 
-    def create_subscription(self, _type: type, _topic: str, callback: Any, _qos: Any) -> Any:
-        self.answer = lambda message: callback(self.stamped(message))
+    def create_subscription(
+        self, _type: type, _topic: str, callback: Any, _qos: Any, *, raw: bool
+    ) -> Any:
+        assert raw
+        self.answer = lambda message: callback(serialize_message(self.stamped(message)))
         return SimpleNamespace(topic_name='/stage/currents', get_publisher_count=lambda: 0)
 
-    def poll(self, _topic: str, _type: type) -> Inbox:
+    def poll(self, _topic: str, _type: type, _qos: Any, *, raw: bool) -> Inbox:
+        assert raw
         return self.inbox
 
     def create_timer(self, period: float, action: Any, clock: Any) -> Any:

@@ -11,15 +11,15 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-NODES = ('recorder', 'monitor', 'plant', 'controller', 'reference', 'view')
+NODES = ('watchers', 'plant', 'controller', 'reference', 'view')
 
 # A node that runs until it is told to end and writes down when it does. What it does instead is in
-# a file named after it, or after it and the folder of the run (monitor@steps): `die`, `stubborn`,
-# `warn`, `fail`, or, for the monitor, the exit code it ends with, or `wait` for a file `enough`.
+# a file named after it, or after it and the folder of the run (watchers@steps): `die`, `stubborn`,
+# `warn`, `fail`, or, for the watchers, the verdict `pass` or `miss`, or `wait` for a file `enough`.
 STAND_IN = r"""#!/usr/bin/env bash
 name=${0##*/} tree=@TREE@ out='' what=''
 for word; do
-  [[ $word != effective_parameters:=* ]] || out=${word#*:=} out=${out%/params/*}
+  [[ $word != *effective_parameters:=* ]] || out=${word#*:=} out=${out%/params/*}
 done
 echo "$name $*" >>"$tree/history"
 printf '%s\n' "$@" >"$tree/arguments/$name"
@@ -41,10 +41,14 @@ case $what in
     ;;
   wait)
     while [[ ! -e $tree/enough ]]; do sleep 0.02; done
-    echo '{}' >"$out/metrics.json"
-    exit 0
+    echo '{"verdict": "pass"}' >"$out/metrics.json"
     ;;
-  [0-9]) sleep 0.3; echo 'y 3.0 um'; echo '{}' >"$out/metrics.json"; exit "$what" ;;
+  pass | miss)
+    sleep 0.3
+    echo 'INFO 1790000000.1 recording'
+    echo 'y 3.0 um'
+    echo "{\"verdict\": \"$what\"}" >"$out/metrics.json"
+    ;;
 esac
 while :; do sleep 0.02; done
 """
@@ -82,14 +86,14 @@ class Tree:
         for name in ('plant', 'scenario_ellipse', 'soft'):
             self.parameters(f'params/{name}.yaml')
         for name in NODES:
-            package = 'maglev_monitor' if name == 'recorder' else f'maglev_{name}'
+            package = 'maglev_monitor' if name == 'watchers' else f'maglev_{name}'
             self.executable(package, name, STAND_IN)
         self.executable('maglev_monitor', 'analyze', ANALYZE)
         self.executable('maglev_view', 'replay', PROGRAM)
         for name in ('paper_tables', 'compare', 'faults', 'robustness', 'tune'):
             self.executable('maglev_study', name, PROGRAM)
         self.executable('maglev_hw_bridge', 'commission', PROGRAM)
-        self.behave('monitor', '0')
+        self.behave('watchers', 'pass')
 
     def parameters(self, name: str, section: str = '/**') -> Path:
         """Write a parameter file that sets nothing."""

@@ -17,19 +17,18 @@ from maglev_model.controller_watch import NOBODY
 from maglev_model.modes import Mode
 from maglev_model.parameters import build, parameter, specs, values
 from maglev_model.phases import Phase
-from maglev_msgs.msg import ControllerState, Currents, Measurement, Reference
 from maglev_node.graph_guard import GraphGuard, Watchers
 from maglev_node.mode_check import mode_conflict
 from maglev_node.node import MaglevNode, SourceParameters
 from maglev_node.process import main as run_main
-from maglev_node.stamp import copy_stamp
+from maglev_node.samples import SampleQueue, SampleWriter, hear
 from maglev_node.topics import (
     CONTROLLER_STATE,
     CURRENTS,
     MEASUREMENT,
     REFERENCE,
+    SAMPLE_TOPICS,
     reference_qos,
-    sample_qos,
 )
 
 _REFERENCE_PERIOD = 2e-3  # between two looks at what references have arrived [s]
@@ -86,24 +85,19 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         )
         self._longest_gap = self.parameters.measurement_timeout / self.parameters.sample_time
         self._sequence = -1
-        self._pending: Measurement | None = None
+        self._pending: Any = None  # measurement that waits for its reference
         self._pending_since = self._answered = 0.0
         self._reference_lost = self._reference_over = self._silent = False
         self._passes = 0  # learned from, when last looked at
         self._logged = (self.supervisor.mode, self.supervisor.reason)
-        self._currents, self._state = Currents(), ControllerState()
-        self._currents.session = secrets.randbits(64) | 1
-        self._currents.header.frame_id = self._state.header.frame_id = 'stage'
+        self._session = secrets.randbits(64) | 1
         GraphGuard(self).claim(CURRENTS, 'controller')
-        self._currents_publisher = self.create_publisher(Currents, CURRENTS, sample_qos())
-        self._state_publisher = self.create_publisher(
-            ControllerState, CONTROLLER_STATE, sample_qos()
-        )
+        self._currents = SampleWriter(self, CURRENTS)
+        self._currents['session'] = self._session
+        self._state = SampleWriter(self, CONTROLLER_STATE)
         self._watchers = Watchers(self, self.parameters.watchers)
-        self._references = self.poll(REFERENCE, Reference, reference_qos())
-        self._measurements = self.create_subscription(
-            Measurement, MEASUREMENT, self._on_measurement, sample_qos()
-        )
+        self._references = SampleQueue(self, REFERENCE, reference_qos())
+        self._measurements = hear(self, MEASUREMENT, self._on_measurement)
         self._by_hand = (
             self.create_service(Trigger, '~/emergency_stop', self._on_emergency_stop),
             self.create_service(SetBool, '~/enable', self._on_enable),
@@ -121,7 +115,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
     def _take_references(self) -> None:
         """Take what has arrived ahead of time, in bursts: being woken for each slows the loop."""
         references = self.supervisor.references
-        for message, _ in self._references.take():
+        for message in self._references.take():
             follows = references.continued_by(message.session, message.sequence)
             if self.supervisor.flying and not follows:  # a second finds the first and leaves
                 if message.session != references.session:
@@ -140,14 +134,14 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
             self._reference_over = message.phase == Phase.END
         self._answer_pending()
 
-    def _on_measurement(self, message: Measurement) -> None:
+    def _on_measurement(self, message: Any) -> None:
         sequence = message.sequence
         if self._in_another_mode(message) or self._anothers(message):
             return
         if self._sequence < 0 and not self._watchers.there(CURRENTS, CONTROLLER_STATE):
             return
         if sequence == self._sequence:  # repeated: the answer was not heard
-            self._currents_publisher.publish(self._currents)
+            self._currents.publish()
             return
         if sequence < self._sequence:
             if self.supervisor.flying and time.monotonic() - self._answered < _SILENCE:
@@ -168,11 +162,11 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
             return
         self._answer(message)
 
-    def _keep_pending(self, message: Measurement) -> None:
+    def _keep_pending(self, message: Any) -> None:
         if self._pending is None or self._pending.sequence != message.sequence:
             self._pending, self._pending_since = message, time.monotonic()
 
-    def _in_another_mode(self, message: Measurement) -> bool:
+    def _in_another_mode(self, message: Any) -> bool:
         """Whether the stage runs in another mode than ours, with which there is no working."""
         if message.lockstep == self._lockstep:
             return False
@@ -180,12 +174,12 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
             self.fail(mode_conflict(self.parameters.mode, message.lockstep))
         return True
 
-    def _anothers(self, message: Measurement) -> bool:
+    def _anothers(self, message: Any) -> bool:
         """Whether another controller flies this stage, into which we must not speak.
 
         The graph tells of it too, but on a busy machine only later.
         """
-        another = message.controller not in (NOBODY, self._currents.session)
+        another = message.controller not in (NOBODY, self._session)
         if another and not self._silent:
             self.get_logger().warning(
                 f'silent since sample {message.sequence}: another controller flies this stage'
@@ -202,18 +196,18 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
             return False
         return supervisor.references.find(sequence) < 0
 
-    def _answer(self, message: Measurement) -> None:
+    def _answer(self, message: Any) -> None:
         self._pending = None
         self._answered = time.monotonic()
-        copy_stamp(message.header.stamp, self._currents.header.stamp)
         supervisor = self.supervisor
         sequence = self._sequence = message.sequence
         row = supervisor.references.find(sequence)
         if row < 0 and self._reference_over and supervisor.references.newest < sequence:
             row = supervisor.references.find(supervisor.references.newest)
         supervisor.step(row, message.gap, message.x, message.z)
+        self._currents.set_stamp(message.stamp)
         self._publish_currents(sequence)
-        self._publish_state(sequence)
+        self._publish_state(message.stamp, sequence)
         if (supervisor.mode, supervisor.reason) != self._logged:
             self._log_change()
             if not supervisor.flying:
@@ -221,25 +215,25 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
 
     def _publish_currents(self, sequence: int) -> None:
         message = self._currents
-        message.sequence = sequence
-        message.direct_current = self.supervisor.direct_current
-        message.quadrature_current = self.supervisor.quadrature_current
-        message.status = int(self.supervisor.status)
-        self._currents_publisher.publish(message)
+        message['sequence'] = sequence
+        message['direct_current'] = self.supervisor.direct_current
+        message['quadrature_current'] = self.supervisor.quadrature_current
+        message['status'] = self.supervisor.status
+        message.publish()
 
-    def _publish_state(self, sequence: int) -> None:
+    def _publish_state(self, stamp: int, sequence: int) -> None:
         message, regulator = self._state, self.supervisor.regulator
-        copy_stamp(self._currents.header.stamp, message.header.stamp)
-        message.sequence = sequence
-        message.mode = int(self.supervisor.mode)
-        message.limited_by = self.supervisor.limited_by
-        message.saturated = message.limited_by != 0
-        message.position = regulator.position
-        message.error = regulator.error
-        message.error_rate = regulator.error_rate
-        message.virtual_input = regulator.virtual_input
-        message.internal_model = regulator.internal_model
-        self._state_publisher.publish(message)
+        message.set_stamp(stamp)
+        message['sequence'] = sequence
+        message['mode'] = self.supervisor.mode
+        message['limited_by'] = self.supervisor.limited_by
+        message['saturated'] = self.supervisor.limited_by != 0
+        message['position'] = regulator.position
+        message['error'] = regulator.error
+        message['error_rate'] = regulator.error_rate
+        message['virtual_input'] = regulator.virtual_input
+        message['internal_model'] = regulator.internal_model
+        message.publish()
 
     def _log_change(self) -> None:
         mode, reason = self._logged = (self.supervisor.mode, self.supervisor.reason)
@@ -353,8 +347,8 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
                 service.send_response(response, header)
         self._take_references()
         with self._measurements.handle:
-            while taken := self._measurements.handle.take_message(Measurement, False):
-                self._on_measurement(taken[0])
+            while taken := self._measurements.handle.take_message(SAMPLE_TOPICS[MEASUREMENT], True):
+                self._measurements.callback(taken[0])
 
     def diagnose(self) -> tuple[bytes, str, Mapping[str, object]]:
         """ERROR in a fault and in a landing nobody asked for."""
@@ -398,7 +392,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
 
 def main() -> None:
     """Entry point of the executable ``controller``."""
-    run_main(ControllerNode, 'controller')
+    run_main('controller', ControllerNode)
 
 
 if __name__ == '__main__':

@@ -139,7 +139,7 @@ class BridgeNode(StageNode[BridgeNodeParameters, BridgeStage]):
 
 def main() -> None:
     """Entry point of the executable ``hw_bridge``."""
-    run_main(BridgeNode, 'hw_bridge')
+    run_main('hw_bridge', BridgeNode)
 
 
 if __name__ == '__main__':

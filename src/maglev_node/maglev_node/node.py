@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar
 
@@ -81,8 +81,11 @@ class MaglevNode(PollingNode, Generic[P]):
         self.parameters: P = ros_parameters.declare(self, name, parameter_table)
         self.add_on_set_parameters_callback(self._on_set_parameters)
         self.steady_clock = Clock(clock_type=ClockType.STEADY_TIME)
-        self._finished: Future = Future()
+        self.finished: Future = Future()
+        """Done when the node has finished."""
         self.exit_code: int | None = None
+        self.failed = False
+        """Whether what is wrong was said by :meth:`fail`."""
         self.came_up = time.monotonic()
         self._said_refused = False
         self._diagnostics = self.create_publisher(DiagnosticArray, DIAGNOSTICS, 10)
@@ -98,10 +101,13 @@ class MaglevNode(PollingNode, Generic[P]):
         return super().create_subscription(msg_type, topic, *args, **kwargs)
 
     def finish(self, exit_code: int = 0) -> None:
-        """End the process with this exit code once the running callback returns."""
+        """Have done, with this exit code, which ends the process once the running callback returns.
+
+        A process of several nodes ends when all have done, or one has failed.
+        """
         if self.exit_code is None:
             self.exit_code = exit_code
-            self._finished.set_result(None)
+            self.finished.set_result(None)
 
     def fail(self, message: str) -> None:
         """Say what is wrong in one line, once, and end the process with exit code 1.
@@ -110,6 +116,7 @@ class MaglevNode(PollingNode, Generic[P]):
         """
         if self.exit_code is None:
             self.get_logger().error(message)
+            self.failed = True
             self.finish(1)
 
     def close(self) -> None:
@@ -184,14 +191,28 @@ class MaglevNode(PollingNode, Generic[P]):
 
     def spin(self, stop: Callable[[], bool]) -> None:
         """Serve the graph until :meth:`finish` or until ``stop()`` holds; every wait is bounded."""
-        executor = EventsExecutor()
-        executor.add_node(self)
-        try:
-            while not self._finished.done() and not stop():
-                executor.spin_until_future_complete(self._finished, timeout_sec=_SPIN_BOUND)
-        except Exception:
-            self.rescue()
-            raise
-        finally:
-            executor.remove_node(self)
-            executor.shutdown()
+        spin([self], stop)
+
+
+def spin(nodes: Sequence[MaglevNode[Any]], stop: Callable[[], bool]) -> None:
+    """Serve the graph with the nodes of a process until all have finished or one has failed.
+
+    Or until ``stop()`` holds; every wait is bounded.
+    """
+    executor = EventsExecutor()
+    for node in nodes:
+        executor.add_node(node)
+    try:
+        while not stop() and not any(node.failed for node in nodes):
+            unfinished = [node for node in nodes if node.exit_code is None]
+            if not unfinished:
+                break
+            executor.spin_until_future_complete(unfinished[0].finished, timeout_sec=_SPIN_BOUND)
+    except Exception:
+        for node in nodes:
+            node.rescue()
+        raise
+    finally:
+        for node in nodes:
+            executor.remove_node(node)
+        executor.shutdown()

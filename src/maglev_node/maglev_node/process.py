@@ -1,4 +1,4 @@
-"""A process that runs one node: from its signals to its exit code."""
+"""A process that runs a node, or several: from its signals to its exit code."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence, Sized
 from typing import Any, cast
 
 import rclpy
@@ -19,7 +19,7 @@ from rclpy.signals import SignalHandlerOptions
 from maglev_model.command import leave_with
 from maglev_model.parameters import ParameterError
 from maglev_node.dds import prepare_middleware
-from maglev_node.node import MaglevNode, NodeError
+from maglev_node.node import MaglevNode, NodeError, spin
 from maglev_node.usage import usage
 
 _DELIVERY_TIME = 0.5
@@ -33,8 +33,8 @@ _BACKGROUND_NICENESS = 5
 _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU)
 
 
-def run(make_node: Callable[[], MaglevNode[Any]], name: str) -> int:
-    """Run one node to its end and return the exit code of the process.
+def run(name: str, *make_nodes: Callable[[], MaglevNode[Any]]) -> int:
+    """Run the nodes of a process to their end and return its exit code.
 
     SIGINT, SIGTERM and SIGHUP (unless ignored, as by nohup) end it in order, which is exit code 0
     unless the node says otherwise: :meth:`MaglevNode.close` runs and can still publish. After a
@@ -53,15 +53,15 @@ def run(make_node: Callable[[], MaglevNode[Any]], name: str) -> int:
         if number == signal.SIGHUP and signal.getsignal(number) == signal.SIG_IGN:
             continue
         signal.signal(number, catch)
-    node: MaglevNode[Any] | None = None
+    nodes: list[MaglevNode[Any]] = []
     prepare_middleware()
     try:
         rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
-        node = make_node()
+        for make in make_nodes:
+            nodes.append(make())
         gc.collect()
         gc.freeze()
-        running = node
-        node.spin(lambda: bool(caught) and (running.may_stop() or len(caught) > 1))
+        _spin(nodes, caught)
     except (NodeError, ParameterError) as error:
         print(f'{name}: error: {error}', file=sys.stderr, flush=True)
         return 1
@@ -72,27 +72,38 @@ def run(make_node: Callable[[], MaglevNode[Any]], name: str) -> int:
         print(f'{name}: error: {text}', file=sys.stderr, flush=True)
         return 1
     finally:
-        _close(node)
+        _close(nodes)
     if signal.SIGXCPU in caught:
         text = 'no wait for seconds on end: this machine is too slow or too busy for real time'
         print(f'{name}: error: {text}', file=sys.stderr, flush=True)
         return 1
-    return node.exit_code or 0
+    return max(node.exit_code or 0 for node in nodes)
 
 
-def main(node: type[MaglevNode[Any]], name: str, *, background: bool = False) -> None:
-    """Entry point of an executable: run one node and leave with its exit code.
+def _spin(nodes: Sequence[MaglevNode[Any]], caught: Sized) -> None:
+    def stop() -> bool:
+        return bool(caught) and (all(node.may_stop() for node in nodes) or len(caught) > 1)
 
-    With ``--help`` or ``-h`` it only says what the node is.
-    A node in the background yields to those of the loop when they want the same core.
+    if len(nodes) == 1:
+        nodes[0].spin(stop)
+    else:
+        spin(nodes, stop)
+
+
+def main(name: str, *nodes: type[MaglevNode[Any]], background: bool = False) -> None:
+    """Entry point of an executable: run its nodes and leave with their exit code.
+
+    With ``--help`` or ``-h`` it only says what they are. Nodes in the background yield to those of
+    the loop when they want the same core. Several are for what only watches: those of the loop take
+    their real-time priority, and land, each in a process of its own.
     Leaves without the interpreter's own teardown, which may block in the middleware.
     """
     if {'-h', '--help'} & set(sys.argv[1:]):
-        leave_with(lambda: _help(node, name))
+        leave_with(lambda: _help(name, nodes))
     if background:
         os.nice(_BACKGROUND_NICENESS)
     try:
-        code = run(cast(Callable[[], MaglevNode[Any]], node), name)
+        code = run(name, *cast(Sequence[Callable[[], MaglevNode[Any]]], nodes))
     except Exception:
         sys.excepthook(*sys.exc_info())
         code = 70
@@ -101,8 +112,8 @@ def main(node: type[MaglevNode[Any]], name: str, *, background: bool = False) ->
     os._exit(code)
 
 
-def _help(node: type[MaglevNode[Any]], name: str) -> int:
-    print(usage(node, name))
+def _help(name: str, nodes: Iterable[type[MaglevNode[Any]]]) -> int:
+    print('\n\n'.join(usage(node, name) for node in nodes))
     return 0
 
 
@@ -111,15 +122,15 @@ def _is_user_error(error: Exception) -> bool:
     return type(error).__module__.startswith(('rclpy', '_rclpy'))
 
 
-def _close(node: MaglevNode[Any] | None) -> None:
-    """The node's last work, then out of the graph: a middleware that blocks is left after a bound.
+def _close(nodes: Iterable[MaglevNode[Any]]) -> None:
+    """The nodes' last work, then out of the graph: a middleware that blocks is left after a bound.
 
     Which is exit code 1, with the threads' tracebacks on stderr.
     """
-    if node is not None:
+    for node in nodes:
         node.close()
     faulthandler.dump_traceback_later(_LEAVING_TIME, exit=True)
-    if node is not None:
+    for node in nodes:
         _deliver(node)
         node.destroy_node()
     rclpy.try_shutdown()

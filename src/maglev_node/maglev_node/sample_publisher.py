@@ -8,10 +8,10 @@ from typing import Any, TypeVar
 from rosgraph_msgs.msg import Clock
 
 from maglev_model.stage import EncoderSample, Truth
-from maglev_msgs.msg import Measurement, PlantState
 from maglev_node.graph_guard import Watchers
 from maglev_node.node import MaglevNode, SourceParameters
-from maglev_node.stamp import copy_stamp, set_stamp
+from maglev_node.samples import SampleWriter
+from maglev_node.stamp import set_stamp
 from maglev_node.topics import CLOCK, MEASUREMENT, TRUE_STATE, sample_qos
 
 _CLOCK_SAMPLES = 10
@@ -31,18 +31,18 @@ class SamplePublisher:
         self._node = node
         self._period = round(1e9 * sample_time)  # [ns]
         self._first: tuple[int, int] | None = None  # sample, and its time [ns]
-        self._clock, self._measurement, self._true_state = Clock(), Measurement(), PlantState()
-        self._measurement.header.frame_id = self._true_state.header.frame_id = 'stage'
-        self._measurement.lockstep = node.parameters.mode == 'lockstep'
-        self._publisher: Any = node.create_publisher(Measurement, MEASUREMENT, sample_qos())
+        lockstep = node.parameters.mode == 'lockstep'
+        self._measurement = SampleWriter(node, MEASUREMENT)
+        self._measurement['lockstep'] = lockstep
         self._topics = [MEASUREMENT]
         self._watchers = Watchers(node, node.parameters.watchers)
-        self._true_publisher: Any = None
+        self._true_state: SampleWriter | None = None
         if truth:
             self._topics.append(TRUE_STATE)
-            self._true_publisher = node.create_publisher(PlantState, TRUE_STATE, sample_qos())
+            self._true_state = SampleWriter(node, TRUE_STATE)
+        self._clock = Clock()
         self._clock_publisher: Any = None
-        if self._measurement.lockstep:
+        if lockstep:
             self._clock_publisher = node.create_publisher(Clock, CLOCK, sample_qos())
 
     def start(self) -> None:
@@ -58,21 +58,20 @@ class SamplePublisher:
         truth: Truth | None,
     ) -> None:
         """Publish one sample; ``controller`` is the session of the one whose currents flow."""
-        message = self._measurement
-        message.wall_time = time.time_ns()
+        message, wall_time = self._measurement, time.time_ns()
         if self._first is None:
-            self._first = sequence, message.wall_time
-        set_stamp(message.header.stamp, self.stage_time(sequence))
-        message.sequence = sequence
-        message.gap, message.x, message.z = sample
-        message.late_samples = late_samples
-        message.controller = controller
-        self._publisher.publish(message)
-        if truth is not None and self._true_publisher is not None:
-            self._publish_truth(truth)
+            self._first = sequence, wall_time
+        stamp = self.stage_time(sequence)
+        message.set_stamp(stamp)
+        message['sequence'], message['wall_time'] = sequence, wall_time
+        message['gap'], message['x'], message['z'] = sample
+        message['late_samples'], message['controller'] = late_samples, controller
+        message.publish()
+        if truth is not None and self._true_state is not None:
+            self._publish_truth(self._true_state, sequence, stamp, truth)
         since = sequence - self._first[0]
         if self._clock_publisher is not None and since % _CLOCK_SAMPLES == 0:
-            copy_stamp(message.header.stamp, self._clock.clock)
+            set_stamp(self._clock.clock, stamp)
             self._clock_publisher.publish(self._clock)
 
     def stage_time(self, sequence: int) -> int:
@@ -91,14 +90,15 @@ class SamplePublisher:
 
     def destroy(self) -> None:
         """Leave the graph."""
-        for publisher in (self._publisher, self._true_publisher, self._clock_publisher):
-            if publisher is not None:
-                self._node.destroy_publisher(publisher)
+        writers = [self._measurement, *([self._true_state] if self._true_state else [])]
+        clock = [self._clock_publisher] if self._clock_publisher else []
+        for publisher in [*(writer.publisher for writer in writers), *clock]:
+            self._node.destroy_publisher(publisher)
 
-    def _publish_truth(self, truth: Truth) -> None:
-        state = self._true_state
-        copy_stamp(self._measurement.header.stamp, state.header.stamp)
-        state.sequence = self._measurement.sequence
-        state.state, state.direct_current, state.quadrature_current = truth[:3]
-        state.thermal_load, state.own_length = truth.thermal_load, truth.own_length
-        self._true_publisher.publish(state)
+    @staticmethod
+    def _publish_truth(message: SampleWriter, sequence: int, stamp: int, truth: Truth) -> None:
+        message.set_stamp(stamp)
+        message['sequence'] = sequence
+        for field, value in zip(Truth._fields, truth, strict=True):
+            message[field] = value
+        message.publish()

@@ -8,14 +8,12 @@ from typing import Any, Generic, TypeVar
 
 from maglev_model.controller_watch import NOBODY, ControllerWatch, Verdict
 from maglev_model.stage import EncoderSample, Fault, Stage, StageError
-from maglev_msgs.msg import Currents
 from maglev_node.managed_node import ManagedNode
 from maglev_node.pacing import Deadlines, Pace, StageClock
-from maglev_node.polling import PolledSubscription
 from maglev_node.sample_publisher import SamplePublisher
+from maglev_node.samples import SampleQueue, hear
 from maglev_node.stage_parameters import ClockedStageParameters, StageNodeParameters
-from maglev_node.stamp import nanoseconds
-from maglev_node.topics import CURRENTS, sample_qos
+from maglev_node.topics import CURRENTS
 
 _REPEAT_PERIOD = 0.02
 """How often lockstep looks whether an answer is overdue, and repeats the first sample [s]."""
@@ -55,11 +53,9 @@ class Sampling(Generic[P, S]):
         if not stage.paced:
             self._pace = Deadlines(stage.sample_time)
         if node.parameters.mode == 'lockstep':
-            self._answers = node.create_subscription(
-                Currents, CURRENTS, self._on_answer, sample_qos()
-            )
+            self._answers = hear(node, CURRENTS, self._on_answer)
         else:
-            self._currents: PolledSubscription = node.poll(CURRENTS, Currents)
+            self._currents = SampleQueue(node, CURRENTS)
 
     def start(self) -> None:
         """Activate the stage and take the first sample. Raises StageError."""
@@ -132,7 +128,7 @@ class Sampling(Generic[P, S]):
 
     # -- lockstep ----------------------------------------------------------------------------------
 
-    def _on_answer(self, message: Currents) -> None:
+    def _on_answer(self, message: Any) -> None:
         if self._timer is None or not (self.answered or self._publisher.watched()):
             return
         verdict = self._judge(message)
@@ -207,10 +203,10 @@ class Sampling(Generic[P, S]):
         else:
             self._write(fresh)
 
-    def _take_currents(self) -> Currents | None:
+    def _take_currents(self) -> Any:
         """The newest that are followed, if any; called at the tick, so that none come too late."""
         fresh = None
-        for message, _ in self._currents.take():
+        for message in self._currents.take():
             verdict = self._judge(message)
             if verdict is Verdict.ELSEWHERE:
                 continue
@@ -244,7 +240,7 @@ class Sampling(Generic[P, S]):
                 self.sequence, self._sample, self.late_samples, controller, truth
             )
 
-    def _judge(self, message: Currents) -> Verdict:
+    def _judge(self, message: Any) -> Verdict:
         """What becomes of a command; one that is refused is a fault."""
         sequence, controller = message.sequence, self.controller
         verdict = controller.judge(
@@ -253,7 +249,7 @@ class Sampling(Generic[P, S]):
             message.status,
             message.direct_current,
             message.quadrature_current,
-            stamped=nanoseconds(message.header.stamp) == self._publisher.stage_time(sequence),
+            stamped=message.stamp == self._publisher.stage_time(sequence),
             sample=self.sequence,
             flying=self.stage.flying,
         )
@@ -263,7 +259,7 @@ class Sampling(Generic[P, S]):
             self._node.get_logger().warning(controller.why, once=True)
         return verdict
 
-    def _write(self, message: Currents) -> None:
+    def _write(self, message: Any) -> None:
         """Let the stage follow fresh currents."""
         if self._lost:
             return

@@ -13,8 +13,3 @@ def set_stamp(stamp: Time, nanoseconds: int) -> None:
 def nanoseconds(stamp: Time) -> int:
     """A stamp as time since the epoch [ns]."""
     return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
-
-
-def copy_stamp(source: Time, target: Time) -> None:
-    """Give one message the stamp of another."""
-    target.sec, target.nanosec = source.sec, source.nanosec

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
+from maglev_model.wire import KEY_OF_MESSAGE_TYPE
 from maglev_msgs.msg import ControllerState, Currents, Measurement, PlantState, Reference
 
 MEASUREMENT = 'stage/measurement'
@@ -25,6 +26,12 @@ SAMPLE_TOPICS: dict[str, type] = {
     TRUE_STATE: PlantState,
 }
 """The topics that carry one message a sample, with their types."""
+
+KEYS = {
+    topic: KEY_OF_MESSAGE_TYPE[f'maglev_msgs/msg/{message_type.__name__}']
+    for topic, message_type in SAMPLE_TOPICS.items()
+}
+"""Their keys in :data:`maglev_model.wire.TOPIC_TYPES`."""
 
 
 def sample_qos(depth: int = 16384) -> QoSProfile:

@@ -39,7 +39,7 @@ class PlantNode(StageNode[PlantNodeParameters, SimulatedStage]):
 
 def main() -> None:
     """Entry point of the executable ``plant``."""
-    run_main(PlantNode, 'plant')
+    run_main('plant', PlantNode)
 
 
 if __name__ == '__main__':

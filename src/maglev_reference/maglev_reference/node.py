@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
-import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
@@ -19,13 +18,12 @@ from maglev_model.geometry import outputs_of_gaps
 from maglev_model.modes import Mode
 from maglev_model.parameters import parameter
 from maglev_model.phases import Phase
-from maglev_msgs.msg import ControllerState, Measurement, Reference
 from maglev_msgs.srv import Step
 from maglev_node.graph_guard import GraphGuard, Watchers
 from maglev_node.mode_check import mode_conflict
 from maglev_node.node import MaglevNode, SourceParameters
 from maglev_node.process import main as run_main
-from maglev_node.stamp import nanoseconds, set_stamp
+from maglev_node.samples import SampleQueue, SampleWriter
 from maglev_node.topics import (
     CONTROLLER_STATE,
     MEASUREMENT,
@@ -43,6 +41,7 @@ from maglev_reference.timeline import Timeline
 _LOOK_PERIOD = 0.25  # between two looks at the graph while the stage is flown [s]
 _REMINDER = 5.0  # between two lines about what is waited for [s]
 _IDLE_PERIOD = 0.02  # from one sample to the next while nothing shall move, in lockstep [s]
+_PLANNED = ('phase', 'segment', 'position', 'velocity', 'acceleration', 'target')
 _NEWS_TIME = 0.2  # in which an answer shows what a call has changed in the controller [s]
 
 
@@ -106,14 +105,12 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         self._run = ReferenceRun(self.parameters, self.parameters.lead, self.parameters.autostart)
         self._watchers = Watchers(self, self.parameters.watchers)
         self._seen = self._reminded = self._looked = time.monotonic()
-        self._message = Reference()
-        self._message.header.frame_id = 'stage'
-        self._message.session = secrets.randbits(64) | 1
-        self._publisher = self.create_publisher(Reference, REFERENCE, reference_qos())
-        self._measurements = self.poll(MEASUREMENT, Measurement, sample_qos(1))
-        self._states = self.poll(CONTROLLER_STATE, ControllerState, sample_qos(1))
+        self._message = SampleWriter(self, REFERENCE, reference_qos())
+        self._message['session'] = secrets.randbits(64) | 1
+        self._measurements = SampleQueue(self, MEASUREMENT, sample_qos(1))
+        self._states = SampleQueue(self, CONTROLLER_STATE, sample_qos(1))
         self._lockstep = self.parameters.mode == 'lockstep'
-        self._measured: Measurement | None = None
+        self._measured: Any = None
         self._published = 0.0  # when, last
         self.create_subscription(JointTrajectory, '~/trajectory', self._on_trajectory, 1)
         self.create_service(Trigger, '~/lift_off', self._lift_off)
@@ -123,8 +120,8 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
 
     def _poll(self) -> None:
         """Take what is new, and publish what is due."""
-        for state, _ in self._states.take(1):
-            self._run.observe_controller(Mode(state.mode), int(state.sequence))
+        for state in self._states.take(1):
+            self._run.observe_controller(Mode(state.mode), state.sequence)
         news = self._take_measurement()
         if not self._run.started:
             self._wait(news)
@@ -139,12 +136,12 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
     def _take_measurement(self) -> bool:
         """Take the newest measurement; false when there is none, or one to be left alone."""
         news = False
-        for message, _ in self._measurements.take(1):
-            if self._run.observe(int(message.sequence)) and self._in_one_mode(message):
+        for message in self._measurements.take(1):
+            if self._run.observe(message.sequence) and self._in_one_mode(message):
                 news, self._measured, self._seen = True, message, time.monotonic()
         return news
 
-    def _in_one_mode(self, message: Measurement) -> bool:
+    def _in_one_mode(self, message: Any) -> bool:
         """Whether the stage runs in our mode; in flight no other one can come."""
         conflict = mode_conflict(self.parameters.mode, message.lockstep)
         if conflict and self._run.grounded:
@@ -180,7 +177,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
     def _waiting_for(self) -> str:
         missing = self._watchers.missing(REFERENCE)
         if missing:
-            where = self._publisher.topic_name
+            where = self._message.publisher.topic_name
             return f'waiting for {", ".join(missing)} to subscribe to {where}'
         if self._measurements.publisher_count() == 0:
             return f'waiting for a stage on {self._measurements.topic}'
@@ -192,7 +189,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         """The outputs (5,) [m, rad] that were measured last."""
         assert self._measured is not None
         gap, x, z = self._measured.gap, self._measured.x, self._measured.z
-        return outputs_of_gaps(np.array(gap), x, z, self.parameters.machine.radius)
+        return outputs_of_gaps(gap, x, z, self.parameters.machine.radius)
 
     def _start(self) -> None:
         if not self._graph.alone():
@@ -248,19 +245,15 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         first, block = due
         self._published = time.monotonic()
         message = self._message
-        stage_time = nanoseconds(self._measured.header.stamp)
+        stage_time = self._measured.stamp
         period = round(1e9 * self.parameters.sample_time)
         for row in range(len(block.phase)):
-            message.sequence = first + row
+            message['sequence'] = first + row
             ahead = first + row - self._measured.sequence
-            set_stamp(message.header.stamp, stage_time + ahead * period)
-            message.phase = int(block.phase[row])
-            message.segment = int(block.segment[row])
-            message.position = block.position[row]
-            message.velocity = block.velocity[row]
-            message.acceleration = block.acceleration[row]
-            message.target = block.target[row]
-            self._publisher.publish(message)
+            message.set_stamp(stage_time + ahead * period)
+            for field in _PLANNED:
+                message[field] = getattr(block, field)[row]
+            message.publish()
 
     def _follow_phase(self) -> None:
         """Say what the stage is asked to do now, and end where that is wanted."""
@@ -376,7 +369,7 @@ def _point(given: Any) -> Point:
 
 def main() -> None:
     """Entry point of the executable ``reference``."""
-    run_main(ReferenceNode, 'reference')
+    run_main('reference', ReferenceNode)
 
 
 if __name__ == '__main__':

@@ -203,7 +203,7 @@ class ViewNode(MaglevNode[ViewNodeParameters]):
 
 def main() -> None:
     """Entry point of the executable."""
-    run_main(ViewNode, 'view', background=True)
+    run_main('view', ViewNode, background=True)
 
 
 if __name__ == '__main__':

@@ -9,9 +9,9 @@ import pytest
 
 from maglev_model.parameters import build
 from maglev_model.phases import Phase
+from maglev_model.wire import DecodeError
 from maglev_monitor.live.discovery import DiscoveryWatch
 from maglev_monitor.live.run_watch import RunWatch, WatchParameters
-from maglev_monitor.metrics.decoding import DecodeError
 
 ALL = {'measurement': 1, 'currents': 1, 'reference': 1}
 PARAMETERS = build(WatchParameters, {'start_timeout': 5.0, 'timeout': 2.0, 'fault_grace': 1.0})

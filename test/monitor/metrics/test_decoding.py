@@ -11,13 +11,8 @@ from hypothesis import strategies as st
 from made_up_run import Encoder
 
 from maglev_model.phases import Phase
-from maglev_monitor.metrics.decoding import (
-    KEY_OF_MESSAGE_TYPE,
-    TOPIC_TYPES,
-    DecodeError,
-    decode,
-    stamps,
-)
+from maglev_model.wire import KEY_OF_MESSAGE_TYPE, TOPIC_TYPES, DecodeError
+from maglev_monitor.metrics.decoding import decode, stamps
 from maglev_monitor.metrics.derived import positions
 from maglev_monitor.metrics.joiner import ROW
 from maglev_monitor.metrics.run_metrics import LIMITS

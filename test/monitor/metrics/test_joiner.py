@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from maglev_model.phases import Phase
-from maglev_monitor.metrics.decoding import TOPIC_TYPES, Records, decode
+from maglev_model.wire import TOPIC_TYPES
+from maglev_monitor.metrics.decoding import Records, decode
 from maglev_monitor.metrics.joiner import Joiner
 
 KEYS = tuple(TOPIC_TYPES)

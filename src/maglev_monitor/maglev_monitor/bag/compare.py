@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maglev_model.phases import Phase
+from maglev_model.wire import TOPIC_TYPES
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.reader import Bag, Batch
-from maglev_monitor.metrics.decoding import TOPIC_TYPES, Records
+from maglev_monitor.metrics.decoding import Records
 
 WALL_CLOCK = ('seconds', 'nanoseconds', 'late_samples', 'wall_time', 'session', 'controller')
 """Fields that two runs of the same thing need not share: when it was, and who sent it."""

@@ -11,10 +11,10 @@ from typing import NoReturn
 
 from maglev_model.command import leave_with
 from maglev_model.progress import Progress
+from maglev_model.wire import TOPIC_TYPES
 from maglev_monitor.bag.compare import TopicComparison, compare
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.reader import Bag
-from maglev_monitor.metrics.decoding import TOPIC_TYPES
 
 EQUAL, DIFFERENT, UNREADABLE = 0, 1, 2
 

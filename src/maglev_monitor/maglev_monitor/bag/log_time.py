@@ -6,7 +6,8 @@ import struct
 from bisect import bisect_right
 from collections.abc import Sequence
 
-from maglev_monitor.metrics.decoding import KEY_OF_MESSAGE_TYPE, decode
+from maglev_model.wire import KEY_OF_MESSAGE_TYPE
+from maglev_monitor.metrics.decoding import decode
 
 _STAMP = struct.Struct('<iI')  # of the header, behind the encapsulation
 _HEADER = 4

@@ -15,9 +15,10 @@ from rosbags.rosbag2.errors import ReaderError
 from rosbags.typesys import Stores, get_typestore
 
 from maglev_model.progress import Progress
+from maglev_model.wire import KEY_OF_MESSAGE_TYPE
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.mcap_file import MAGIC_BYTES, McapFile, TopicMessages
-from maglev_monitor.metrics.decoding import KEY_OF_MESSAGE_TYPE, Records, decode
+from maglev_monitor.metrics.decoding import Records, decode
 
 _DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
 _READER_BATCH = 5000  # messages handed on at once when rosbags reads

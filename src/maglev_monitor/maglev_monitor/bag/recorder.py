@@ -171,7 +171,7 @@ def _bag_time(nanoseconds: int) -> QosTime:
 
 def main() -> None:
     """Entry point of the executable."""
-    run_main(RecorderNode, 'recorder', background=True)
+    run_main('recorder', RecorderNode, background=True)
 
 
 if __name__ == '__main__':

@@ -11,9 +11,9 @@ from typing import Any, ClassVar
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from maglev_model.parameters import parameter
+from maglev_model.wire import DecodeError
 from maglev_monitor.live.discovery import DiscoveryWatch
 from maglev_monitor.live.run_watch import RunWatch, WatchParameters
-from maglev_monitor.metrics.decoding import DecodeError
 from maglev_monitor.metrics.result_file import write_metrics
 from maglev_monitor.metrics.run_parameters import FAULT_LEVEL, RUN_KEY, run_to_json
 from maglev_monitor.report.terminal import as_text
@@ -22,15 +22,7 @@ from maglev_node.node import MaglevNode, NodeError, NodeParameters
 from maglev_node.polling import PolledSubscription
 from maglev_node.process import main as run_main
 from maglev_node.stamp import nanoseconds
-
-KEYS = {
-    topics.REFERENCE: 'reference',
-    topics.MEASUREMENT: 'measurement',
-    topics.CURRENTS: 'currents',
-    topics.CONTROLLER_STATE: 'controller',
-    topics.TRUE_STATE: 'plant',
-}
-"""Keys of a run's topics."""
+from maglev_node.topics import KEYS
 
 _POLL_PERIOD = 0.05
 
@@ -177,7 +169,7 @@ class MonitorNode(MaglevNode[MonitorParameters]):
 
 def main() -> None:
     """Entry point of the executable."""
-    run_main(MonitorNode, 'monitor', background=True)
+    run_main('monitor', MonitorNode, background=True)
 
 
 if __name__ == '__main__':

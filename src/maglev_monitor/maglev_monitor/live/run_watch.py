@@ -11,10 +11,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from maglev_model.parameters import parameter
+from maglev_model.wire import DecodeError
 from maglev_monitor.live.discovery import DiscoveryWatch
 from maglev_monitor.live.progress import Progress
 from maglev_monitor.live.silence import SilenceWatch
-from maglev_monitor.metrics.decoding import DecodeError, decode
+from maglev_monitor.metrics.decoding import decode
 from maglev_monitor.metrics.joiner import Joiner
 from maglev_monitor.metrics.run_metrics import RunMetrics
 from maglev_monitor.metrics.run_parameters import RunParameters

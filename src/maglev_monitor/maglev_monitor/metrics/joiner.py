@@ -11,7 +11,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from maglev_model.phases import Phase
-from maglev_monitor.metrics.decoding import TOPIC_TYPES, Records, stamps
+from maglev_model.wire import TOPIC_TYPES
+from maglev_monitor.metrics.decoding import Records, stamps
 
 _COLUMNS: dict[str, tuple[tuple[str, str], ...]] = {
     'reference': (

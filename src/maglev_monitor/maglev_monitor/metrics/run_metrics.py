@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from maglev_model.axes import AXES
 from maglev_model.phases import Phase
 from maglev_model.plugins import find_plugin
+from maglev_model.wire import TOPIC_TYPES
 from maglev_monitor.metrics.arrivals import Arrivals
-from maglev_monitor.metrics.decoding import TOPIC_TYPES, Records
+from maglev_monitor.metrics.decoding import Records
 from maglev_monitor.metrics.derived import SOURCES, phase_currents, positions
 from maglev_monitor.metrics.faults import Faults, Instant
 from maglev_monitor.metrics.holes import Holes

@@ -9,17 +9,15 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from maglev_monitor.metrics.decoding import DecodeError, decode
+from maglev_model.wire import DecodeError
+from maglev_monitor.metrics.decoding import decode
 from maglev_node.node import MaglevNode, NodeError, NodeParameters
 from maglev_node.process import main as run_main
 from maglev_node.topics import (
     CONTROLLER_STATE,
-    CURRENTS,
     DIAGNOSTICS,
-    MEASUREMENT,
-    REFERENCE,
+    KEYS,
     SAMPLE_TOPICS,
-    TRUE_STATE,
 )
 from maglev_view.parameters import WebParameters
 from maglev_view.web.calls import Operator
@@ -27,15 +25,6 @@ from maglev_view.web.live import Live
 
 if TYPE_CHECKING:
     from maglev_view.web.page import Page
-
-KEYS = {
-    MEASUREMENT: 'measurement',
-    CURRENTS: 'currents',
-    REFERENCE: 'reference',
-    CONTROLLER_STATE: 'controller',
-    TRUE_STATE: 'plant',
-}
-"""The topics that are shown, by the keys that their samples are decoded by."""
 
 _DEPTHS = {CONTROLLER_STATE: 16384}  # of which each sample counts; of the others the newest
 _MISSING = "the live view needs viser: run 'MAGLEV_SETUP=view source setup.sh', then again"
@@ -115,7 +104,7 @@ def _qos(depth: int) -> QoSProfile:
 
 def main() -> None:
     """Entry point of the executable."""
-    run_main(WebNode, 'web', background=True)
+    run_main('web', WebNode, background=True)
 
 
 if __name__ == '__main__':

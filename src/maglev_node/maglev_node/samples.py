@@ -1,0 +1,97 @@
+"""The sample topics on the graph: read and written in place, without building message objects."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from numpy.typing import ArrayLike
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
+
+from maglev_model.wire import DecodeError, Incoming, Outgoing
+from maglev_node.polling import PollingNode
+from maglev_node.topics import KEYS, SAMPLE_TOPICS, sample_qos
+
+_FRAME = 'stage'
+
+
+class SampleWriter:
+    """Publishes a sample topic; what is not written before is as in the message before."""
+
+    def __init__(self, node: Node, topic: str, qos: QoSProfile | None = None) -> None:
+        self._message = Outgoing(KEYS[topic], _FRAME)
+        self.publisher = node.create_publisher(SAMPLE_TOPICS[topic], topic, qos or sample_qos())
+
+    def __setitem__(self, field: str, value: ArrayLike) -> None:
+        """Write a field. Raises KeyError for none of the message's, ValueError for the shape."""
+        self._message[field] = value
+
+    def set_stamp(self, nanoseconds: int) -> None:
+        """Write the header's stamp [ns since the epoch]."""
+        self._message.set_stamp(nanoseconds)
+
+    def publish(self) -> None:
+        """Publish the message as it is now."""
+        self.publisher.publish(self._message.serialized())
+
+
+class SampleReader:
+    """Reads what comes on a sample topic; what cannot be read is left out, and said once."""
+
+    def __init__(self, node: Node, topic: str) -> None:
+        self._node, self._topic = node, topic
+        self._incoming = Incoming(KEYS[topic])
+
+    def read(self, message: bytes) -> Any:
+        """A named tuple of the header's ``stamp`` [ns] and the message's fields, or None."""
+        try:
+            return self._incoming.read(message)
+        except DecodeError as error:
+            topic = self._node.resolve_topic_name(self._topic)
+            self._node.get_logger().error(f'{topic}: {error}', once=True)
+            return None
+
+
+def hear(
+    node: Node, topic: str, callback: Callable[[Any], None], qos: QoSProfile | None = None
+) -> Subscription[Any]:
+    """Subscribe to a sample topic: ``callback`` is called with what :class:`SampleReader` reads.
+
+    The subscription is of serialized messages, and so is its own callback.
+    """
+    reader = SampleReader(node, topic)
+
+    def take(message: bytes) -> None:
+        sample = reader.read(message)
+        if sample is not None:
+            callback(sample)
+
+    return node.create_subscription(
+        SAMPLE_TOPICS[topic], topic, take, qos or sample_qos(), raw=True
+    )
+
+
+class SampleQueue:
+    """A sample topic whose messages wait until they are taken."""
+
+    def __init__(self, node: PollingNode, topic: str, qos: QoSProfile | None = None) -> None:
+        self._queue = node.poll(topic, SAMPLE_TOPICS[topic], qos, raw=True)
+        self._reader = SampleReader(node, topic)
+        self.topic = self._queue.topic
+
+    def take(self, at_most: int = 100_000) -> Iterator[Any]:
+        """What waits, oldest first, as :class:`SampleReader` reads it."""
+        for message, _ in self._queue.take(at_most):
+            sample = self._reader.read(message)
+            if sample is not None:
+                yield sample
+
+    def publisher_count(self) -> int:
+        """How many publishers the topic has."""
+        return self._queue.publisher_count()
+
+    def destroy(self) -> None:
+        """Give the queue up."""
+        self._queue.destroy()
