@@ -196,12 +196,13 @@ def test_two_stages_at_once_one_of_them_remapped(
     assert plant.wait() == 0, plant.output
 
 
-NODES = ('plant', 'hw_bridge', 'controller', 'reference', 'monitor', 'recorder')
+NODES = ('plant', 'hw_bridge', 'controller', 'reference', 'monitor', 'recorder', 'watchers')
 
 
 @pytest.mark.parametrize('name', NODES)
 def test_help(name: str) -> None:
-    package = {'recorder': 'maglev_monitor'}.get(name, f'maglev_{name}')
+    of_monitor = name in ('recorder', 'watchers')
+    package = 'maglev_monitor' if of_monitor else f'maglev_{name}'
     done = subprocess.run(
         [executable(package, name), '--help'], capture_output=True, text=True, timeout=60
     )
@@ -209,6 +210,10 @@ def test_help(name: str) -> None:
     assert f'usage: {name} ' in done.stdout
     assert 'effective_parameters: string' in done.stdout
     assert 'diagnostics' in done.stdout
+    if name == 'watchers':
+        assert '-p NODE:NAME:=VALUE' in done.stdout
+        for parameter in ('compress: bool', 'start_timeout: double'):  # of either
+            assert parameter in done.stdout
     if name == 'plant':
         assert "mode: string, default 'lockstep', one of lockstep, realtime" in done.stdout
         assert 'answer_timeout: double [s], default 8.0, [0.1, 600] s' in done.stdout

@@ -297,7 +297,7 @@ class Breaking(BridgeNode):
     def _break(self):
         raise RuntimeError('a defect')
 
-main(Breaking, 'hw_bridge')
+main('hw_bridge', Breaking)
 """
 
 

@@ -133,6 +133,48 @@ def test_bag_and_live_run_give_the_same_figures(nodes: Nodes, feeder: Feeder) ->
         assert all(e.offered_qos_profiles[0].reliability.name == 'RELIABLE' for e in sampled)
 
 
+def start_watchers(nodes: Nodes, *arguments: str) -> Process:
+    return nodes.start(
+        'watchers',
+        f'recorder:output:={nodes.folder / "bag"}',
+        f'monitor:output:={nodes.folder / "metrics.json"}',
+        'monitor:exit_at_end:=false',
+        *arguments,
+        params=('monitor.yaml',),
+    )
+
+
+def test_in_one_process_recorder_and_monitor_do_as_they_do_apart(
+    nodes: Nodes, feeder: Feeder, observer: Observer
+) -> None:
+    watchers = start_watchers(nodes, 'monitor:limits.max_overshoot:=99.0')
+    feeder.wait_for(2)
+    time.sleep(1.2)  # the monitor has told the recorder what is measured
+    feeder.feed()
+    observer.wait((nodes.folder / 'metrics.json').is_file)
+    assert watchers.running  # who records until all have ended
+    watchers.signal(signal.SIGINT)
+    assert watchers.wait() == 0, watchers.output
+    assert recorded(nodes.folder / 'bag') == dict.fromkeys(TOPICS, SAMPLES)
+    assert analyse(nodes.folder / 'bag').result == metrics(nodes)
+    assert metrics(nodes)['verdict'] == 'pass'
+
+
+def test_in_one_process_the_one_that_fails_ends_both(nodes: Nodes) -> None:
+    (nodes.folder / 'bag').mkdir()
+    watchers = start_watchers(nodes)
+    assert watchers.wait() == 1
+    assert 'exists already' in watchers.output
+    unwritable = nodes.folder / 'file'
+    unwritable.touch()
+    watchers = start_watchers(
+        nodes, f'recorder:output:={nodes.folder / "other"}', f'monitor:output:={unwritable}/m.json'
+    )
+    assert watchers.wait() == 1
+    assert 'cannot write' in watchers.output
+    assert (nodes.folder / 'other' / 'metadata.yaml').is_file()  # its bag is finished
+
+
 def test_others_read_and_play_a_bag(
     nodes: Nodes, observer: Observer, feeder: Feeder, run: Run
 ) -> None:

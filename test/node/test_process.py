@@ -116,6 +116,45 @@ def test_a_node_that_waits_is_ended_by_a_second_signal_and_by_no_first() -> None
     assert node.happened == ['asked', 'closed', 'destroyed']
 
 
+SEVERAL = """
+from maglev_node import node, process
+
+class Made(node.MaglevNode):
+    def __init__(self):
+        super().__init__(self.called, node.NodeParameters)
+        self.create_timer(self.after, self.act, clock=self.steady_clock)
+    def act(self):
+        print(self.called, flush=True)
+        self.fail('broken') if self.fails else self.finish(self.code)
+    def close(self): print('closed', self.called, flush=True)
+
+def made(called, after, code=0, fails=False):
+    return type(called, (Made,), dict(called=called, after=after, code=code, fails=fails))
+
+process.main('several', {nodes})
+"""
+
+
+@pytest.mark.parametrize(
+    ('nodes', 'code', 'said'),
+    [
+        ("made('a', 0.1), made('b', 0.4)", 0, ['a', 'b', 'closed a', 'closed b']),
+        ("made('a', 0.1, code=3), made('b', 0.4)", 3, ['a', 'b', 'closed a', 'closed b']),
+        ("made('a', 0.4), made('b', 0.1, code=3)", 3, ['b', 'a', 'closed a', 'closed b']),
+        ("made('a', 60.0), made('b', 0.1, fails=True)", 1, ['b', 'closed a', 'closed b']),
+    ],
+)
+def test_several_nodes_end_when_all_have_done_or_one_has_failed(
+    nodes: str, code: int, said: list[str]
+) -> None:
+    program = SEVERAL.replace('{nodes}', nodes)
+    done = subprocess.run(
+        [sys.executable, '-c', program], capture_output=True, text=True, timeout=30, check=False
+    )
+    found = list(dict.fromkeys(done.stdout.splitlines()))  # a timer may tick twice
+    assert (done.returncode, found) == (code, said), done.stderr
+
+
 def test_a_middleware_that_blocks_does_not_keep_the_process() -> None:
     program = (
         'import ctypes\n'

@@ -35,6 +35,7 @@ _IMPORTED_BY_NODES = (
     *('maglev_plant.node', 'maglev_controller.node', 'maglev_reference.node'),
     *('maglev_hw_bridge.node', 'maglev_monitor.live.node', 'maglev_monitor.bag.recorder'),
 )
+_PACKAGES = {'web': 'maglev_view'} | dict.fromkeys(('recorder', 'watchers'), 'maglev_monitor')
 _MATCHING = 0.3  # in which a service has seen a new client, whose answer would else be lost [s]
 
 
@@ -150,7 +151,7 @@ class Nodes:
 
         ``on`` is what the command begins with that starts it on another host.
         """
-        package = {'recorder': 'maglev_monitor', 'web': 'maglev_view'}.get(name, f'maglev_{name}')
+        package = _PACKAGES.get(name, f'maglev_{name}')
         command = [*on, executable(package, name), '--ros-args']
         for file in params:
             path = PARAMS / file if (PARAMS / file).exists() else Path(file)

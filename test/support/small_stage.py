@@ -66,4 +66,4 @@ class SmallStage(ManagedNode[SmallParameters]):
 
 
 if __name__ == '__main__':
-    main(SmallStage, 'small_stage')
+    main('small_stage', SmallStage)

@@ -113,7 +113,10 @@ def main(name: str, *nodes: type[MaglevNode[Any]], background: bool = False) -> 
 
 
 def _help(name: str, nodes: Iterable[type[MaglevNode[Any]]]) -> int:
-    print('\n\n'.join(usage(node, name) for node in nodes))
+    texts = [usage(node, name) for node in nodes]
+    if len(texts) > 1:
+        texts.insert(0, 'several nodes in one process; -p NODE:NAME:=VALUE is for one of them')
+    print('\n\n'.join(texts))
     return 0
 
 

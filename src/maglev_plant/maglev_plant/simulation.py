@@ -105,8 +105,7 @@ class SimulatedStage:
     @property
     def thermal_load(self) -> FloatArray:
         """Used share of the thermal budget of motors 1..4, each its hottest phase, shape (4,)."""
-        load: FloatArray = self._arrays.load.reshape(4, 3).max(axis=1)
-        return load
+        return np.array([max(phases) for phases in self._arrays.load.reshape(4, 3).tolist()])
 
     def truth(self) -> Truth:
         """The true state of the sample the plant stands at."""
