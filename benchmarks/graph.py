@@ -1,8 +1,9 @@
 """What the whole graph costs: lockstep tick against a bare echo, CPU time, start-up, memory.
 
-Runs bare echoes between two rclpy processes and the ellipse scenario (plant, controller, reference,
-monitor, recorder) in turn, so that a drifting machine drifts for both, and prints the ratio of the
-median tick to the median round trip round by round. Use it with the environment of ``setup.sh``::
+Runs bare echoes between two rclpy processes, the graph's messages without what makes them
+(``skeleton.py``) and the ellipse scenario (plant, controller, reference, monitor, recorder) in
+turn, so that a drifting machine drifts for all, and prints the ratio of the median tick to the
+other medians round by round. Use it with the environment of ``setup.sh``::
 
     source setup.sh && python benchmarks/graph.py
 """
@@ -21,6 +22,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import skeleton
 
 from maglev_model.axes import FloatArray
 from maglev_monitor.bag.reader import Bag
@@ -28,6 +30,7 @@ from maglev_monitor.bag.reader import Bag
 ROOT = Path(__file__).parents[1]
 LEVITATING = 0.0309  # the platen is off its stop below this gap [m]
 LARGEST_RATIO, LEAST_FACTOR, LONGEST_START, MOST_MEMORY = 1.8, 2.5, 5.0, 250.0
+LARGEST_OF_SKELETON = 1.3
 
 
 def round_trip(executor: str, seconds: float) -> float:
@@ -172,22 +175,27 @@ def main() -> int:
     rows, runs = [], []
     for number in range(options.rounds):
         default, events = round_trip('default', 3.0), round_trip('events', 3.0)
+        bones = skeleton.tick(4.0)
         with tempfile.TemporaryDirectory() as folder:
             run = scenario(Path(folder) / 'run', options.duration, watch)
-        rows.append((run.tick / default, run.tick / events, run.factor, run.start))
+        rows.append(
+            (run.tick / default, run.tick / events, run.tick / bones, run.factor, run.start)
+        )
         runs.append(run)
         print(
             f'round {number + 1}: tick {run.tick * 1e6:.0f} us, bare echo {default * 1e6:.0f} us'
-            f' (default executor), {events * 1e6:.0f} us (events executor);'
+            f' (default executor), {events * 1e6:.0f} us (events executor),'
+            f' skeleton {bones * 1e6:.0f} us;'
             f' {run.factor:.2f} x real time, levitates after {run.start:.1f} s',
             flush=True,
         )
     watch.over.set()
-    by_default, by_events, factor, start = (
+    by_default, by_events, by_bones, factor, start = (
         statistics.median(row) for row in zip(*rows, strict=True)
     )
     print(f'tick / bare echo, rclpy default executor: {by_default:.2f}')
     print(f'tick / bare echo, EventsExecutor:         {by_events:.2f}')
+    print(f'tick / skeleton:                          {by_bones:.2f}')
     print(f'real-time factor: {factor:.2f}, from command to levitation: {start:.1f} s')
     starting, spent = [run.starting for run in runs], [run.spent for run in runs]
     print('CPU time until it levitates [ms]: ' + _by_node(starting, 1e3))
@@ -197,6 +205,7 @@ def main() -> int:
         print(f'peak memory, {name} [MB]: {by_node}')
     kept = (
         min(by_default, by_events) <= LARGEST_RATIO
+        and by_bones <= LARGEST_OF_SKELETON
         and factor >= LEAST_FACTOR
         and start <= LONGEST_START
         and max(watch.peak.values()) <= MOST_MEMORY
