@@ -125,7 +125,7 @@ def record_type(key: str, message: bytes) -> np.dtype[np.void]:
     """Where the fields of a message lie, and its stamp as ``seconds`` and ``nanoseconds``.
 
     :param key: key of the topic in :data:`TOPIC_TYPES`.
-    :param message: one serialized message, or the beginning of it with as many octets more.
+    :param message: one serialized message.
     :raises DecodeError: when it is too short, too long or not plain little-endian CDR.
     """
     if message[:2] != _ENCAPSULATION[:2]:
