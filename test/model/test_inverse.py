@@ -223,3 +223,73 @@ def test_quadrature_current_yields_to_levitation_and_is_cut_by_the_current_witho
     assert plain.limited_by & CURRENT
     wide = CurrentLimits(current=1000.0, levitation_first=1.0, least_attraction=0.1)
     assert Answered(exact_inverse, wide, output, wanted).limited_by == LEVITATION
+
+
+@pytest.mark.parametrize('current', [1000.0, 0.4])
+def test_what_the_simplified_inverse_realises_is_what_its_own_model_gives(current: float) -> None:
+    """Tilted and, at 0.4 A, cut: (11) with the currents as they are, which is no longer wanted."""
+    output, wanted = (
+        np.array([0.023, 0.0, 0.0, 0.002, -0.005]),
+        np.array([2.0, 4.0, -3.0, 9.0, 7.0]),
+    )
+    limits = WIDE._replace(current=current)
+    answer = Answered(simplified_inverse, limits, output, wanted)
+    a, b, c = np.zeros(9), np.zeros(6), np.zeros(6)
+    u_x, u_z = answer.quadrature[1], answer.quadrature[0]
+    affine_terms(MACHINE, output[0], output[3], output[4], u_x, u_z, a, b, c)
+    i_1, i_2, i_3, i_4 = answer.direct
+    v_y, v_phi, v_theta = 0.5 * (i_1 + i_2 + i_3 + i_4), i_1 - i_3, i_4 - i_2
+    own = (
+        a[0] + a[2] * v_y + a[1] * v_phi + a[6] * v_theta,
+        *answer.plant[1:3],
+        b[0] + b[2] * v_y + b[1] * v_phi,
+        c[0] + c[2] * v_y + c[1] * v_theta,
+    )
+    assert answer.realised == pytest.approx(own, rel=1e-9)
+    assert (answer.realised == pytest.approx(wanted, rel=1e-6)) == (answer.limited_by == 0)
+    assert bool(answer.limited_by) == (current < 1000.0)
+
+
+@pytest.mark.parametrize('only', [3, 4])
+def test_a_tilt_alone_is_controlled_by_its_own_motors(only: int) -> None:
+    """By (12) , the other row and column left out: it gets no control, y what it wants."""
+    controlled = np.ones(5)
+    controlled[7 - only] = 0.0
+    output, wanted = (
+        np.array([0.024, 0.0, 0.0, 0.001, -0.002]),
+        np.array([1.0, 0.3, -0.2, 5.0, -7.0]),
+    )
+    for inverse in (simplified_inverse, exact_inverse):
+        answer = Answered(inverse, WIDE, output, wanted, controlled)
+        assert answer.realised[[0, only]] == pytest.approx(wanted[[0, only]], rel=1e-6)
+        others = answer.direct[[1, 3]] if only == 3 else answer.direct[[0, 2]]
+        assert others[0] == pytest.approx(others[1], abs=1e-12)
+
+
+def test_tilted_y_without_control_is_left_to_the_magnets() -> None:
+    """All motors together attract as without current, though each gap is another."""
+    controlled = np.array([0.0, 1.0, 1.0, 1.0, 1.0])
+    output = np.array([0.025, 0.0, 0.0, 0.003, -0.01])
+    wanted = np.zeros(5)
+    answer = Answered(exact_inverse, WIDE, output, wanted, controlled)
+    state, alone, none = np.zeros(10), np.zeros(5), np.zeros(4)
+    state[::2] = output
+    accelerations(MACHINE, state, none, none, alone)
+    assert answer.plant[0] == pytest.approx(alone[0], rel=1e-9)
+    assert answer.plant[3:] == pytest.approx([0.0, 0.0], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ('inverse', 'motors'), [(exact_inverse, 1), (exact_inverse, 4), (simplified_inverse, 4)]
+)
+def test_an_inverse_writes_its_answer_and_nothing_beside_it(
+    inverse: Callable[..., int], motors: int
+) -> None:
+    """What lies behind in memory belongs to the rest of a record."""
+    machine = machine_constants(MachineParameters(motors=motors))
+    output, wanted = np.array([0.025, 0.0, 0.0, 0.001, 0.002]), np.ones(5)
+    room = [np.full(size + 2, np.nan) for size in (4, 4, 5, 2)]
+    inverse(machine, PRIORITY, ALL, output, wanted, Answer(*(part[1:-1] for part in room)))
+    for part in room:
+        assert np.isnan(part[[0, -1]]).all()
+        assert np.isfinite(part[1:-1]).all()

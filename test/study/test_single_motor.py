@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
-from maglev_model.inverse import Answer, CurrentLimits, exact_inverse
+from maglev_model.inverse import CURRENT, LEVITATION, Answer, CurrentLimits, exact_inverse
 from maglev_model.machine import MachineParameters, machine_constants
-from maglev_model.motor import horizontal_force, vertical_force
+from maglev_model.motor import attraction_coefficients, horizontal_force, vertical_force
 from maglev_model.parameters import ParameterError, build, from_yaml, replace
 from maglev_model.phases import Phase
 from maglev_model.platen import accelerations
@@ -35,8 +35,8 @@ gaps = st.floats(0.0185, 0.0305)
 
 def inverse(
     gap: float, w_y: float, w_x: float, limits: CurrentLimits
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
-    """Currents i_d, i_q, realised accelerations, and whether limited."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+    """Currents i_d, i_q, realised accelerations, and what limited them."""
     output, wanted = np.zeros(5), np.zeros(5)
     output[0], wanted[0], wanted[1] = gap, w_y, w_x
     direct, quadrature, realised, excess = (np.full(n, 9.0) for n in (4, 4, 5, 2))
@@ -85,6 +85,37 @@ def test_levitation_comes_before_travel(gap: float, w_y: float, w_x: float) -> N
     assert math.hypot(direct[1], quadrature[1]) <= 7.0 * (1.0 + 1e-9)
     alone = inverse(gap, w_y, 0.0, limits)[2]
     assert realised[0] == pytest.approx(alone[0], rel=1e-6, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ('w_y', 'w_x', 'limited_by'),
+    [
+        (12.0, 0.0, LEVITATION),  # fall faster than with the least attraction
+        (-1000.0, 0.0, CURRENT),  # rise faster than the current makes it
+        (0.0, 2.0, 0),
+        (0.0, 200.0, LEVITATION),  # i_q beyond what the attraction leaves
+        (-1000.0, 200.0, CURRENT | LEVITATION),
+    ],
+)
+def test_what_limits_it_is_told(w_y: float, w_x: float, limited_by: int) -> None:
+    limits = CurrentLimits(7.0, 1.0, 0.1)
+    _, _, realised, told = inverse(0.025, w_y, w_x, limits)
+    assert told == limited_by
+    assert (realised[0] == pytest.approx(w_y, abs=1e-6)) == (abs(w_y) < 10.0)
+    assert (realised[1] == pytest.approx(w_x, abs=1e-6)) == (w_x < 200.0)
+
+
+@pytest.mark.parametrize('left', [-0.05, 0.05])
+def test_an_attraction_that_leaves_too_little_for_i_q_is_told_beside_the_current(
+    left: float,
+) -> None:
+    """By (2) b² i_q² of the attraction wanted are spent; ``left`` [N] are for i_d, which is cut."""
+    _, b, _ = attraction_coefficients(MACHINE, 0.0185)
+    pull = (2.5 * b) ** 2 + left
+    w_y = MACHINE.G - pull / MACHINE.M_y
+    direct, quadrature, _, told = inverse(0.0185, w_y, 500.0, CurrentLimits(2.5, 0.0, 0.0))
+    assert (direct[1], abs(quadrature[1])) == (2.5, 2.5)
+    assert told == (CURRENT if left > 0.0 else CURRENT | LEVITATION)
 
 
 def test_a_single_motor_needs_its_guides_locked() -> None:
