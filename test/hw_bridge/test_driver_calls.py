@@ -97,6 +97,12 @@ def test_encoders_on_both_boards_and_phases_crossed() -> None:
     driver.close()
 
 
+def test_samples_need_an_encoder_on_the_board_whose_clock_paces_them() -> None:
+    driver_on(Module(), encoder__board=[0, 1, 1, 1, 1, 1])
+    with pytest.raises(ParameterError, match=r"'encoder\.board' has no encoder on board 0"):
+        driver_on(Module(), encoder__board=[1] * 6)
+
+
 @pytest.mark.parametrize('board', [0, 1])
 def test_an_expired_watchdog_is_honoured(board: int) -> None:
     module = Module()

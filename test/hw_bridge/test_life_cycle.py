@@ -255,6 +255,18 @@ def test_unhomed_stays_unhomed_when_boards_come_back() -> None:
     assert not stage.encoders.homed
 
 
+def test_a_reset_in_flight_where_nothing_is_latched_is_refused_and_changes_nothing() -> None:
+    plain, asked = Flight(hover(0.025)), Flight(hover(0.025))
+    for flight in (plain, asked):
+        flight.regulator.reset()
+        flight.run(150)
+        if flight is asked:
+            assert flight.stage.reset() == (False, 'there is no fault')
+        flight.run(50)
+        assert flight.stage.mode is Mode.FOLLOWING
+    assert np.array_equal(asked.rig.state, plain.rig.state)
+
+
 @pytest.mark.parametrize('recover', ['reset', 'restart', 'deactivate'])
 def test_a_second_fault_after_every_recovery(recover: str) -> None:
     """What was done about the first one leaves nothing behind that spoils the second."""
@@ -539,21 +551,24 @@ def test_a_place_that_cannot_be_written_is_said(tmp_path: Path) -> None:
     assert stage.mode is Mode.CLOSED
 
 
+@pytest.mark.parametrize('call', ['open', 'counts'])
 @pytest.mark.parametrize('error', [DriverError('no boards'), OSError('something else')])
-def test_whatever_opening_raises_gives_everything_back(tmp_path: Path, error: Exception) -> None:
+def test_whatever_opening_raises_gives_everything_back(
+    tmp_path: Path, error: Exception, call: str
+) -> None:
     stage = kept(tmp_path / 'boards.json')
     closed: list[bool] = []
 
-    def fails() -> None:
+    def fails(*_: object) -> None:
         raise error
 
-    opens, closes = stage.driver.open, stage.driver.close
-    stage.driver.open = fails  # type: ignore[method-assign]
+    closes = stage.driver.close
+    setattr(stage.driver, call, fails)
     stage.driver.close = lambda: closed.append(True) or closes()  # type: ignore[method-assign]
     with pytest.raises(StageError if isinstance(error, DriverError) else OSError):
         stage.configure()
     assert closed
-    stage.driver.open = opens  # type: ignore[method-assign]
+    assert stage.mode is Mode.CLOSED
     again = kept(tmp_path / 'boards.json')
     again.configure()  # nobody holds them
     again.close()
