@@ -140,6 +140,13 @@ def test_a_speed_that_no_platen_has_is_not_foretold(speed: float) -> None:
     assert max(impacts_of_cut(parameters, 0.025, 0.9 * 0.75).values()) > 0.65
 
 
+def test_where_nobody_knows_the_place_a_cut_is_foretold_from_midway_between_the_stops() -> None:
+    parameters = BridgeParameters()
+    for speed in (0.0, 0.1, np.nan):
+        foretold = impacts_of_cut(parameters, np.nan, speed)
+        assert foretold == impacts_of_cut(parameters, 0.0245, speed)
+
+
 def test_a_cut_on_the_ellipse_is_far_from_soft() -> None:
     flight = fly(ellipse, round(1000 * 0.25 * 2 * np.pi / OMEGA))
     assert impact_when_cut(flight) > 4 * SOFT
@@ -279,6 +286,23 @@ def test_a_platen_that_is_not_held_on_its_way_is_noticed(
     assert landing.astray == (abs(share) > 1.0)
     landing.begin(place, np.zeros(5))
     assert not landing.astray
+
+
+@pytest.mark.parametrize('axis', [3, 4])
+@pytest.mark.parametrize(('y', 'share'), [(0.0250, 0.95), (0.0295, 0.5)])
+def test_a_tilt_may_take_more_of_the_attraction_where_a_cut_would_throw_it_up(
+    axis: int, y: float, share: float
+) -> None:
+    parameters = BridgeParameters()
+    landing, machine = Landing(parameters), machine_constants(parameters.machine)
+    place = np.array([y, 0.0, 0.0, 0.0, 0.0])
+    landing.begin(place, np.zeros(5))
+    landing.step(place, np.zeros(5), 1e3 * np.eye(5)[axis])
+    made = output_accelerations(
+        machine, y, 0.0, 0.0, landing.direct_current, landing.quadrature_current
+    )
+    attraction = machine.M_y * (machine.G - made[0])
+    assert abs(made[axis]) * machine.I_x / machine.r == pytest.approx(share * attraction, rel=1e-6)
 
 
 def test_the_balance_is_where_magnets_carry_the_platen() -> None:

@@ -94,10 +94,15 @@ def test_a_landing_is_not_cut_short_by_a_fault() -> None:
     assert flight.rig.impact < NOMINAL
 
 
-@pytest.mark.parametrize(('samples', 'rests'), [(60, False), (130, True)])
-def test_where_it_stands_still_near_its_stop_it_rests(samples: int, rests: bool) -> None:
+@pytest.mark.parametrize(
+    ('samples', 'above', 'rests'),
+    [(60, 1e-4, False), (130, 1e-4, True), (130, 1.9e-4, True), (130, 2.3e-4, False)],
+)
+def test_where_it_stands_still_near_its_stop_it_rests(
+    samples: int, above: float, rests: bool
+) -> None:
     flight = Flight(hover(LOWER_STOP))
-    flight.stage.encoders.arrays.zero[:4] -= 1e-4  # a stop that is higher here
+    flight.stage.encoders.arrays.zero[:4] -= above  # a stop that is higher here
     for _ in range(samples):
         flight.stage.read()
         flight.stage.write(np.full(4, 0.05), np.zeros(4))
@@ -144,6 +149,23 @@ def test_a_corner_that_leaves_the_stop_is_enough(
         flight.stage.read()
         flight.stage.write(np.zeros(4), np.zeros(4))
     assert ('left its stop' in str(flight.stage.fault)) == left
+
+
+@pytest.mark.parametrize('axis', [3, 4])
+@pytest.mark.parametrize('sign', [-1.0, 1.0])
+@pytest.mark.parametrize(('rising', 'left'), [(4e-3, False), (0.012, True)])
+def test_a_corner_that_will_soon_be_off_the_stop_is_enough(
+    axis: int, sign: float, rising: float, left: bool
+) -> None:
+    """A corner that is 0.15 mm off and rises at so many m/s, about the middle that stays."""
+    flight = Flight(hover(LOWER_STOP))
+    flight.run(20, controlled=False)
+    state, radius = flight.stage.guard.arrays, flight.stage.parameters.machine.radius
+    corner = np.array([[-1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, -1.0]])[axis - 3]
+    state.length[:4] = LOWER_STOP - 1.5e-4 * sign * corner
+    state.rate[:] = 0.0
+    state.rate[axis] = -sign * rising / radius
+    assert flight.stage._leaves() == left
 
 
 def test_what_was_moved_while_nobody_looked_has_not_left_its_stop() -> None:
