@@ -30,6 +30,23 @@ def test_a_count_tells_only_of_the_axes_that_move_its_encoder(encoder: int, told
     assert set(np.flatnonzero(watched.still_time == 0.0)) == told
 
 
+@pytest.mark.parametrize('used', [(0, 1, 2, 3), (0, 2), (1, 3), (1, 2, 3), (0, 1), (2,), (3,)])
+def test_y_follows_the_gaps_by_the_same_share_however_many_are_believed(
+    used: tuple[int, ...],
+) -> None:
+    """Of three poles at 200 1/s after 1 ms, where all that are believed read 0.1 mm more."""
+    watched = guard.Guard(PARAMETERS).arrays
+    length = np.array([0.025, 0.025, 0.025, 0.025, 0.0, 0.0])
+    observer.start(watched.block[0], length)
+    watched.length[:] = length
+    length[:4] += 1e-4
+    believed = np.isin(np.arange(6), used)
+    observer.correct(watched.block[0], length, believed, np.ones(6, np.bool_))
+    share = 1.0 - np.exp(-3.0 * PARAMETERS.fault.bandwidth * PARAMETERS.sample_time)
+    assert watched.position[Y] - 0.025 == pytest.approx(share * 1e-4)
+    assert watched.position[[PHI, THETA]] == pytest.approx([0.0, 0.0], abs=1e-12)
+
+
 def pull_of_tilt(theta: float) -> float:
     """Acceleration of theta at 25 mm, without current [rad/s^2]."""
     machine, none = machine_constants(PARAMETERS.machine), np.zeros(4)
@@ -64,13 +81,33 @@ def test_what_begins_on_its_stop_rests_whatever_noise_says() -> None:
     assert np.all(judge.arrays.rate == 0.0)
 
 
-@pytest.mark.parametrize(('encoder', 'away'), [(0, -0.8), (3, 0.03), (4, 0.47), (5, -0.1)])
+@pytest.mark.parametrize(
+    ('encoder', 'away'), [(0, -0.8), (1, 0.03), (3, 0.03), (4, 0.47), (5, -0.1)]
+)
 def test_what_begins_where_no_platen_can_be_has_lost_its_count(encoder: int, away: float) -> None:
     judge, stop = guard.Guard(PARAMETERS), PARAMETERS.machine.gap_max
     length = np.array([stop, stop, stop, stop, 0.0, 0.0])
     length[encoder] += away
     assert judge.watch(length, np.zeros(12), False) == (guard.JUMP, encoder)
     assert judge.failed == [encoder]
+
+
+def test_what_makes_no_place_at_all_is_begun_anew_until_it_does() -> None:
+    """Gaps that differ by more than the platen is long give no tilt."""
+    judge, length = guard.Guard(PARAMETERS), np.array([0.025, 0.025, 0.025, 0.025, 0.0, 0.0])
+    for away in (0.8, 0.0, 0.0):
+        judge.watch(length + away * np.array([0, 1, 0, -1, 0, 0]), np.zeros(12), True)
+        assert np.isfinite(judge.arrays.position).all() == (away == 0.0)
+    assert judge.arrays.position == pytest.approx([0.025, 0.0, 0.0, 0.0, 0.0])
+    assert np.all(judge.arrays.rate == 0.0)
+
+
+def test_what_four_gaps_contradict_each_other_by_is_told_as_it_was_read() -> None:
+    judge = guard.Guard(PARAMETERS)
+    for off in (0.0, 3e-5, -1e-5):
+        length = np.array([0.025 + off, 0.0251, 0.0252, 0.0249, 0.0, 0.0])
+        judge.watch(length, np.zeros(12), False)
+        assert judge.residual == pytest.approx(2e-4 + off, abs=1e-12)
 
 
 def test_what_begins_aloft_moves_as_it_is_read() -> None:
@@ -98,6 +135,30 @@ def test_x_is_missed_near_the_lower_stop_too_when_a_gap_is_lost(
         judge.watch(length, amplifiers.arrays.current, True)
         blamed += judge.blamed
     assert blamed == found
+
+
+@pytest.mark.parametrize('along', [X, Z])
+def test_what_stands_still_moves_as_fast_as_it_is_pushed_since_it_counted(along: int) -> None:
+    """Nor is it thought to be braked by what it read while nobody doubted it yet."""
+    judge, amplifiers = guard.Guard(PARAMETERS), Amplifiers(PARAMETERS)
+    length = np.array([0.025, 0.025, 0.025, 0.025, 0.0, 0.0])
+    watched, i_q = judge.arrays, np.zeros(4)
+    for _ in range(200):
+        judge.watch(length, np.zeros(12), True)
+        watched.position[0], watched.rate[0], watched.disturbance[0] = 0.025, 0.0, 0.0
+    i_q[2 - along :: 2] = 0.3
+    amplifiers.drive(np.zeros(4), i_q, 0.0, 0.0)
+    machine, none = machine_constants(PARAMETERS.machine), np.zeros(4)
+    push = output_accelerations(machine, 0.025, 0.0, 0.0, none, i_q)[along]
+    samples = 0
+    while judge.blamed == []:
+        judge.watch(length, amplifiers.arrays.current, True)
+        watched.position[0], watched.rate[0], watched.disturbance[0] = 0.025, 0.0, 0.0
+        samples += 1
+        if abs(watched.unseen[3 + along]) > 3e-5 and judge.blamed == []:
+            assert watched.rate[along] == pytest.approx(1e-3 * samples * push, rel=1e-3)
+            assert watched.disturbance[along] == pytest.approx(0.0, abs=1e-3)
+    assert judge.blamed == [3 + along]
 
 
 def test_x_that_counts_after_all_is_taken_at_its_word() -> None:
