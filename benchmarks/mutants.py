@@ -45,6 +45,7 @@ _BRIDGE = (
     *(f'test/hw_bridge/test_{name}.py' for name in ('controllers', 'commission')),
 )
 _CONTROLLER = ('test/controller', 'test/study/test_closed_loop_figures.py')
+_INVERSE = ('test/model', 'test/reference/test_currents.py', 'test/study/test_single_motor.py')
 
 LOOKED_AT_BY: dict[str, tuple[tuple[str, ...], ...]] = {
     **{
@@ -57,10 +58,7 @@ LOOKED_AT_BY: dict[str, tuple[tuple[str, ...], ...]] = {
     'maglev_controller.supervision': (_CONTROLLER, _CAMPAIGN),
     'maglev_controller.landing': (_CONTROLLER, _CAMPAIGN),
     'maglev_model.controller_watch': (('test/model/test_controller_watch.py', 'test/node'),),
-    'maglev_model.inverse': (
-        ('test/model', 'test/reference/test_currents.py', *_CONTROLLER),
-        ('test/hw_bridge/test_landing.py', *_CAMPAIGN),
-    ),
+    'maglev_model.inverse': ((*_INVERSE, *_CONTROLLER), _CAMPAIGN),
 }
 """Modules, and the tests that look at them, stage by stage, the fastest first."""
 

@@ -18,6 +18,7 @@ from maglev_model.inverse import (
     simplified_inverse,
 )
 from maglev_model.machine import MachineParameters, machine_constants
+from maglev_model.motor import attraction_coefficients
 from maglev_model.platen import accelerations, affine_terms
 
 MACHINE = machine_constants(MachineParameters())
@@ -277,6 +278,21 @@ def test_tilted_y_without_control_is_left_to_the_magnets() -> None:
     accelerations(MACHINE, state, none, none, alone)
     assert answer.plant[0] == pytest.approx(alone[0], rel=1e-9)
     assert answer.plant[3:] == pytest.approx([0.0, 0.0], abs=1e-9)
+
+
+@pytest.mark.parametrize('tilts', [0.0, 1.0])
+@pytest.mark.parametrize('left', [-1e-3, 1e-3])
+def test_an_i_q_that_attracts_more_than_its_pair_may_is_told(left: float, tilts: float) -> None:
+    """By (2) that is 2 b² i_q²; of half of the weight it leaves so many N, or takes more."""
+    _, b, h = attraction_coefficients(MACHINE, 0.025)
+    i_q = np.sqrt((0.5 * MACHINE.M_y * MACHINE.G - left) / (2.0 * b * b))
+    hover, wanted = np.array([0.025, 0.0, 0.0, 0.0, 0.0]), np.zeros(5)
+    wanted[1] = 2.0 * h / MACHINE.M_x * i_q
+    controlled = np.array([1.0, 1.0, 1.0, tilts, tilts])
+    answer = Answered(exact_inverse, WIDE, hover, wanted, controlled)
+    assert abs(answer.quadrature[1]) == pytest.approx(i_q)
+    assert answer.limited_by == (0 if left > 0.0 else LEVITATION)
+    assert answer.plant[0] == pytest.approx(min(left, 0.0) / MACHINE.M_y, abs=1e-9)
 
 
 @pytest.mark.parametrize(
