@@ -269,6 +269,27 @@ def test_what_fails_during_a_landing_is_named_once_beside_what_it_lands_for() ->
     assert 'check its cable' in fault.remedy
 
 
+@pytest.mark.parametrize(('encoder', 'along_z'), [(4, 0.0), (5, 1.0)])
+def test_x_or_z_that_fails_during_a_landing_is_done_without_and_it_is_over_sooner(
+    encoder: int, along_z: float
+) -> None:
+    """Its own motors carry, which takes the least i_d of them, and a third of the time is left."""
+    flight = airborne(descending)
+    flight.stage.stop()
+    flight.run(20)
+    assert flight.stage.landing.arrays.along_z == 0.5
+    flight.boards.stuck[encoder] = True
+    while failed(flight) != {encoder}:
+        flight.step(False)
+    assert flight.stage.mode is Mode.LANDING
+    assert flight.stage.landing.arrays.along_z == along_z
+    lost = flight.samples
+    while flight.stage.mode is Mode.LANDING:
+        flight.step(False)
+    assert flight.samples - lost < 500
+    assert flight.rig.impact <= DEGRADED
+
+
 def test_a_third_gap_during_the_landing_is_landed_and_the_fourth_cut() -> None:
     flight = airborne(descending)
     flight.boards.stuck[0] = True
