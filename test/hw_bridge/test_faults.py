@@ -173,6 +173,25 @@ def test_out_of_the_soft_range_at_the_same_sample(name: str, bounds: tuple[float
         assert (flight.stage.fault is not None) == (not lower[axis] <= value <= upper[axis])
         assert flight.samples < 2000
     assert f'{name} is' in str(flight.stage.fault)
+
+
+@pytest.mark.parametrize(('axis', 'rate'), [(3, 0.02), (3, -0.02), (4, 0.05), (4, -0.05)])
+def test_a_gap_out_of_its_soft_range_is_named_at_the_same_sample(axis: int, rate: float) -> None:
+    """By a tilt [rad/s], while y stays where it is."""
+
+    def tilting(time: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        way = rate * np.eye(5)[axis]
+        return 0.025 * np.eye(5)[0] + time * way, way, np.zeros(5)
+
+    flight = Flight(tilting, {'fault.gap_lower': 0.0248})
+    while flight.stage.fault is None:
+        flight.step()
+        gap = flight.stage.guard.arrays.past[0, :4]
+        assert (flight.stage.fault is not None) == bool(np.min(gap) < 0.0248)
+        assert flight.samples < 500
+    lowest = int(np.argmin(gap))
+    reason = f'gap {lowest + 1} is {1e3 * gap[lowest]:.3f} mm, outside its soft range'
+    assert flight.stage.fault.reason == reason
     landed(flight)
 
 

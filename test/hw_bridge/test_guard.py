@@ -161,6 +161,57 @@ def test_what_stands_still_moves_as_fast_as_it_is_pushed_since_it_counted(along:
     assert judge.blamed == [3 + along]
 
 
+def test_gaps_that_all_stand_still_leave_y_to_the_magnets() -> None:
+    """Without current from 25 mm: as fast as those pull it up since the gaps counted last."""
+    judge, machine = guard.Guard(PARAMETERS), machine_constants(PARAMETERS.machine)
+    length, none = np.array([0.025, 0.025, 0.025, 0.025, 0.0, 0.0]), np.zeros(4)
+    watched = judge.arrays
+    for _ in range(200):
+        judge.watch(length, np.zeros(12), False)
+        watched.position[Y], watched.rate[Y], watched.disturbance[Y] = 0.025, 0.0, 0.0
+        watched.model_rate[Y] = watched.still_time[Y] = 0.0
+    y, speed = 0.025, 0.0
+    while judge.blamed == []:
+        judge.watch(length, np.zeros(12), True)
+        speed += 1e-3 * output_accelerations(machine, y, 0.0, 0.0, none, none)[Y]
+        y += 1e-3 * speed
+        if abs(watched.unseen[0]) > 3e-5 and judge.blamed == []:
+            assert watched.rate[Y] == pytest.approx(speed, rel=0.02)
+            assert watched.disturbance[Y] == pytest.approx(0.0, abs=1e-3)
+    assert judge.blamed == [0, 1, 2, 3]
+
+
+@pytest.mark.parametrize('along', [X, Z])
+@pytest.mark.parametrize('pushed', [-2.0, -0.3, 0.3, 2.0])
+def test_no_more_than_friction_is_believed_to_push_what_nothing_shows(
+    along: int, pushed: float
+) -> None:
+    """As after noise, that lost it while something else seemed to push it [m/s²]."""
+    judge, length = guard.Guard(PARAMETERS), np.array([0.025, 0.025, 0.025, 0.025, 0.0, 0.0])
+    for _ in range(3):
+        judge.watch(length, np.zeros(12), True)
+    judge.arrays.trust[3 + along] = guard_arrays.LOST
+    judge.arrays.disturbance[along] = pushed
+    judge.arrays.rate[along] = 0.1  # it does not come to rest in this sample
+    judge.watch(length, np.zeros(12), True)
+    friction = PARAMETERS.fault.friction[along]
+    assert judge.arrays.disturbance[along] == pytest.approx(np.clip(pushed, -friction, friction))
+
+
+@pytest.mark.parametrize('along', [X, Z])
+def test_what_was_lost_and_counts_again_is_where_it_says_and_slow(along: int) -> None:
+    judge, length = guard.Guard(PARAMETERS), np.array([0.031, 0.031, 0.031, 0.031, 0.0, 0.0])
+    for _ in range(4):
+        judge.watch(length, np.zeros(12), False)
+    judge.lose(3 + along)
+    judge.arrays.position[along] = 3e-3  # where the model has carried it meanwhile
+    while not judge.returned:
+        length[3 + along] -= 1e-5
+        judge.watch(length, np.zeros(12), False)
+    assert judge.arrays.position[along] == pytest.approx(length[3 + along], abs=1e-5)
+    assert abs(judge.arrays.rate[along]) < 0.01
+
+
 def test_x_that_counts_after_all_is_taken_at_its_word() -> None:
     """What was held is not thrown about by how far the model has gone without it."""
     judge, amplifiers = guard.Guard(PARAMETERS), Amplifiers(PARAMETERS)
