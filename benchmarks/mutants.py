@@ -260,6 +260,7 @@ class Copy:
                 target = where / name
                 target.parent.mkdir(parents=True, exist_ok=True)
                 shutil.copy2(ROOT / name, target, follow_symlinks=False)
+        self._cache.mkdir()
         packages = ':'.join(str(path) for path in sorted((where / 'src').iterdir()))
         self._environment = os.environ | {
             'PYTHONPATH': f'{packages}:{os.environ.get("PYTHONPATH", "")}',
