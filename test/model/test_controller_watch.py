@@ -162,3 +162,8 @@ def test_who_gives_up_at_rest_has_to_be_taken_up_again() -> None:
     assert flight.hear(Message(status=Status.GAVE_UP, age=1)) is Verdict.IGNORED
     assert (flight.watch.taken_up, flight.watch.gave_up) == (False, True)
     assert flight.hear(Message()) is Verdict.IGNORED
+
+
+def test_before_any_command_nobody_is_followed_blamed_or_has_given_up() -> None:
+    watch = ControllerWatch()
+    assert (watch.taken_up, watch.why, watch.gave_up) == (False, '', False)
