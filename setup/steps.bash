@@ -142,15 +142,17 @@ exit 1' "$1"
 }
 
 build_packages() {
-  local paths=(src)
+  local paths=(src) options=()
   cd "$root"
   underlay_has tf2_msgs || paths+=(setup/tf2_msgs)
+  [[ $branch == native ]] ||
+    options=("-DCMAKE_PROJECT_INCLUDE=$root/setup/python_messages.cmake")
   in_underlay "$venv/bin/python" \
     -c 'from colcon_core.command import main; raise SystemExit(main())' \
     --log-base .cache/colcon build --base-paths "${paths[@]}" --build-base build \
     --install-base install --symlink-install --event-handlers console_direct- console_cohesion+ \
     --cmake-args "-DPython3_EXECUTABLE=$venv/bin/python" -DBUILD_TESTING=OFF \
-    -DCMAKE_POLICY_VERSION_MINIMUM=3.5 --no-warn-unused-cli
+    -DCMAKE_POLICY_VERSION_MINIMUM=3.5 --no-warn-unused-cli "${options[@]}"
 }
 
 # environment.bash: every path the underlay and the workspace add, moved to the front, and the
