@@ -104,7 +104,7 @@ make_environment() {
   stamp "$venv/.stamp" "$environment_key"
 }
 
-make_build() {
+make_packages() {
   check_compiler
   check_space 100 "$root"
   if ! [[ -f $root/build/.stamp && -f $root/install/.stamp ]] ||
@@ -112,8 +112,12 @@ make_build() {
     rm -rf -- "$root/build" "$root/install"
   fi
   rm -f -- "$root/build/.stamp" "$root/install/.stamp"
-  step 'building the packages in src' build_packages
-  step 'checking that ROS and the packages work' write_and_check_environment
+  step 'building the packages in src' build_packages --packages-ignore maglev_msgs tf2_msgs
+}
+
+make_messages() {
+  build_packages --packages-select maglev_msgs tf2_msgs
+  write_and_check_environment
   stamp "$root/build/.environment" "$environment_key"
   stamp "$root/build/.stamp" "$build_key"
   stamp "$root/install/.stamp" "$build_key"
@@ -121,11 +125,7 @@ make_build() {
 
 compile() {
   local old
-  mkdir -p -- "$cache/numba/$sources"
-  stamp "$cache/numba/current" "$sources"
-  step 'compiling the control loop for this processor' warm_up
-  ! grep -q '^not compiled$' "$log" ||
-    say "not compiled ahead, the first run will; see the end of $log"
+  warm_up
   stamp "$cache/numba/$sources/.stamp" "$build_key"
   # Of older sources, keep two for runs that still use them.
   for old in $(cd "$cache/numba" && ls -t | grep -vx current | tail -n +4); do
@@ -144,7 +144,7 @@ make_view() {
 
 make_test_tools() {
   rm -rf -- "$cache/test-tools" "$cache/test-tools.new"
-  step 'installing the test tools' install_test_tools "$cache/test-tools.new"
+  install_test_tools "$cache/test-tools.new"
   stamp "$cache/test-tools.new/.stamp" "$test_key"
   mv -- "$cache/test-tools.new" "$cache/test-tools"
 }
@@ -169,13 +169,22 @@ main() {
   trap 'interrupted INT 130' INT
   trap 'interrupted TERM 143' TERM
   trap 'interrupted HUP 129' HUP
-  trap stop_ticker EXIT
+  trap 'interrupted QUIT 131' QUIT
+  trap stop_steps EXIT
+  rm -f -- "$log".*
   : >"$log"
   environment_done || make_environment
-  build_done || make_build
-  compiled || compile
   ! wants_view || view_done || make_view
-  [[ $wanted != test ]] || test_done || make_test_tools
+  mkdir -p -- "$cache/numba/$sources"
+  stamp "$cache/numba/current" "$sources"
+  # From here on two things at a time, for most of them keep one processor busy.
+  [[ $wanted != test ]] || test_done || begin 'installing the test tools' make_test_tools
+  build_done || make_packages
+  build_done || begin 'building the messages, checking that ROS works' make_messages
+  compiled || begin 'compiling the control loop for this processor' compile
+  finish
+  ! grep -q '^not compiled$' "$log" ||
+    say "not compiled ahead, the first run will; see the end of $log"
   say "done in $SECONDS s"
 }
 

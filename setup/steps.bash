@@ -1,54 +1,89 @@
 # shellcheck shell=bash
 # The steps of the set-up, each quiet on success and explained in one line on failure.
 
-ticker=''
+declare -A titles=() begun=() # of the steps at work, by the process that does them
 
 # Show a step and its seconds while COMMAND works; its output goes to the log.
 step() { # TITLE COMMAND...
-  local title=$1 start=$SECONDS code=0
-  shift
-  printf '\n== %s: %s\n' "$title" "$*" >>"$log"
-  local before
-  before=$(wc -c <"$log")
-  if [[ -t 2 ]]; then
-    tick "$title" &
-    ticker=$!
-  else
-    say "$title"
-  fi
-  # A subshell with -e: a function that is a step must stop at its first failing command.
-  set +e
-  (set -e && "$@") >>"$log" 2>&1 </dev/null
-  code=$?
-  set -e
-  stop_ticker
-  if ((code)); then
-    explain "$title" "$(tail -c "+$before" -- "$log")"
-  fi
-  [[ ! -t 2 ]] || printf '\r\e[Ksetup: %s (%d s)\n' "$title" $((SECONDS - start)) >&2
+  begin "$@"
+  finish $!
 }
 
-tick() { # TITLE
-  exec 9>&-
-  local start=$SECONDS
-  trap - EXIT
-  while kill -0 $$ 2>/dev/null; do
-    printf '\r\e[Ksetup: %s ... %d s' "$1" $((SECONDS - start)) >&2
-    sleep 1
+# Begin a step that goes on beside those that follow.
+begin() { # TITLE COMMAND...
+  local title=$1
+  shift
+  [[ -t 2 ]] || say "$title"
+  set -m # a process group of its own, for stop_steps
+  (
+    set +m
+    exec >"$log.$BASHPID" 2>&1 </dev/null
+    "$@"
+  ) &
+  set +m
+  titles[$!]=$title
+  begun[$!]=$SECONDS
+}
+
+# Wait for JOB, or else for all that were begun. The first that fails ends the others and the set-up.
+finish() { # [JOB]
+  local job code
+  while ((${#titles[@]})) && [[ -z ${1:-} || -n ${titles[$1]:-} ]]; do
+    for job in "${!titles[@]}"; do
+      if ! kill -0 "$job" 2>/dev/null; then
+        code=0
+        wait "$job" || code=$?
+        ended "$job" "$code"
+      fi
+    done
+    show_steps
+    sleep 0.1
   done
 }
 
-stop_ticker() {
-  if [[ -n $ticker ]]; then
-    kill "$ticker" 2>/dev/null || true
-    wait "$ticker" 2>/dev/null || true
-    ticker=''
+ended() { # JOB CODE
+  local title=${titles[$1]} took=$((SECONDS - ${begun[$1]})) output
+  output=$(<"$log.$1")
+  forget "$1"
+  if (($2)); then
+    stop_steps
+    explain "$title" "$output"
   fi
+  [[ ! -t 2 ]] || printf '\r\e[Ksetup: %s (%d s)\n' "$title" "$took" >&2
+}
+
+forget() { # JOB
+  { printf '\n== %s\n' "${titles[$1]}" && cat -- "$log.$1" || true; } >>"$log"
+  unset "titles[$1]" "begun[$1]"
+  rm -f -- "$log.$1"
+}
+
+show_steps() {
+  local job first='' others=''
+  [[ -t 2 ]] || return 0
+  for job in "${!titles[@]}"; do
+    [[ -n $first ]] && ((begun[$job] >= begun[$first])) || first=$job
+  done
+  [[ -n $first ]] || return 0
+  ((${#titles[@]} == 1)) || others=" and $((${#titles[@]} - 1)) more"
+  printf '\r\e[Ksetup: %s%s ... %d s' "${titles[$first]}" "$others" \
+    $((SECONDS - begun[$first])) >&2
+}
+
+stop_steps() {
+  local job
+  for job in "${!titles[@]}"; do
+    kill -- "-$job" 2>/dev/null || true
+  done
+  for job in "${!titles[@]}"; do
+    wait "$job" 2>/dev/null || true
+    forget "$job"
+  done
 }
 
 interrupted() { # SIGNAL CODE
   trap - INT TERM HUP
-  stop_ticker
+  stop_steps
   [[ ! -t 2 ]] || printf '\n' >&2
   say 'interrupted: the next run completes it'
   exit "$2"
@@ -141,7 +176,7 @@ done
 exit 1' "$1"
 }
 
-build_packages() {
+build_packages() { # COLCON'S OPTION...
   local paths=(src) options=()
   cd "$root"
   underlay_has tf2_msgs || paths+=(setup/tf2_msgs)
@@ -151,6 +186,7 @@ build_packages() {
     -c 'from colcon_core.command import main; raise SystemExit(main())' \
     --log-base .cache/colcon build --base-paths "${paths[@]}" --build-base build \
     --install-base install --symlink-install --event-handlers console_direct- console_cohesion+ \
+    "$@" \
     --cmake-args "-DPython3_EXECUTABLE=$venv/bin/python" -DBUILD_TESTING=OFF \
     -DCMAKE_POLICY_VERSION_MINIMUM=3.5 --no-warn-unused-cli "${options[@]}"
 }
@@ -221,12 +257,14 @@ END
     echo 'unset -f __maglev_first __maglev_last'
   } >"$file.new"
   mv -f -- "$file.new" "$file"
-  mkdir -p -- "$cache/numba"
-  stamp "$cache/numba/current" "$sources"
   in_environment python -c 'import maglev_msgs.msg, matplotlib, numba, rclpy, rosbags, scipy
 import tf2_msgs.msg
 rclpy.init()
 rclpy.shutdown()'
+  # So that the first run need not compile their modules; what fails there is that run's to tell.
+  in_environment python -c 'import maglev_controller.node, maglev_plant.node, maglev_reference.node
+import maglev_monitor.bag.recorder, maglev_monitor.live.node, maglev_monitor.report.run_report
+import maglev_hw_bridge.node, maglev_view.node' || true
 }
 
 setting() { printf 'export %s=%q\n' "$1" "$2"; }
@@ -258,23 +296,23 @@ in_environment() {
     bash -c ". '$root/install/environment.bash' && exec \"\$@\"" - "$@"
 }
 
-# Fill the caches of compiled functions and modules, so that the first run starts as quickly as the
-# second. In two processes, the plant first in one and last in the other, so that what both need is
-# compiled once. Only speed depends on it: a defect of the code is left for a run or the tests.
+# Fill the caches of compiled functions, so that the first run starts as quickly as the second. In
+# two processes, the plant first in one and last in the other, so that what both need is compiled
+# once. Only speed depends on it: a defect of the code is left for a run or the tests. The messages
+# may still be missing.
 warm_up() {
-  in_environment python -c 'import maglev_controller.node, maglev_hw_bridge.node as bridge
-from maglev_controller.parameters import ControllerParameters
+  in_packages python -c 'from maglev_controller.parameters import ControllerParameters
 from maglev_controller.supervision import Supervisor
+from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.stage import BridgeStage
 from maglev_model.parameters import build
 Supervisor(ControllerParameters())
-stage = bridge.BridgeStage.ready(build(bridge.BridgeParameters, {"homing.at_start": True}))
+stage = BridgeStage.ready(build(BridgeParameters, {"homing.at_start": True}))
 stage.read()
 stage.hold()
 stage.close()' &
-  in_environment python -c 'import maglev_study.closed_loop as loop
-import maglev_plant.node, maglev_reference.node
-import maglev_monitor.bag.recorder, maglev_monitor.live.node, maglev_monitor.report.run_report
-import maglev_view.forces, maglev_view.node, numpy
+  in_packages python -c 'import maglev_study.closed_loop as loop
+import maglev_view.forces, numpy
 from maglev_model.machine import MachineParameters
 from maglev_reference import parameters, timeline
 loop.warm_up()
@@ -282,4 +320,10 @@ timeline.Timeline(parameters.ReferenceParameters())
 level, none = numpy.array([0.025, 0.0, 0.0, 0.0, 0.0]), numpy.zeros(4)
 maglev_view.forces.Forces(MachineParameters()).at(level, none, none)' || echo 'not compiled'
   wait $! || echo 'not compiled'
+}
+
+# Run COMMAND with the packages that are built so far.
+in_packages() {
+  in_underlay bash -c '. "$0" && NUMBA_CACHE_DIR=$1 exec "${@:2}"' \
+    "$root/install/local_setup.bash" "$cache/numba/$sources" "$@"
 }
