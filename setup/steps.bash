@@ -119,7 +119,7 @@ pip_install() {
     _ROS_WHEELS_BOOTSTRAP_COMPLETE=1 PYTHONNOUSERSITE=1 \
     bash -c "${ros_setup:+. $ros_setup; } exec \"\$@\"" - \
     "$venv/bin/python" -m pip install --no-input --no-compile --progress-bar off \
-    --retries 2 "$@"
+    --no-warn-conflicts --retries 2 "$@"
 }
 
 install_test_tools() { # FOLDER
