@@ -29,8 +29,8 @@ from maglev_monitor.bag.reader import Bag
 
 ROOT = Path(__file__).parents[1]
 LEVITATING = 0.0309  # the platen is off its stop below this gap [m]
-LARGEST_RATIO, LEAST_FACTOR, LONGEST_START, MOST_MEMORY = 1.8, 2.5, 5.0, 250.0
-LARGEST_OF_SKELETON = 1.3
+LARGEST_RATIO, LEAST_FACTOR, LONGEST_START, MOST_MEMORY = 1.3, 2.5, 5.0, 250.0
+LARGEST_OF_SKELETON = 1.6
 
 
 def round_trip(executor: str, seconds: float) -> float:

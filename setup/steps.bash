@@ -260,6 +260,7 @@ END
   in_environment python -c 'import maglev_msgs.msg, matplotlib, numba, rclpy, rosbags, scipy
 import tf2_msgs.msg
 rclpy.init()
+rclpy.create_node("check").create_publisher(maglev_msgs.msg.Measurement, "check", 1)
 rclpy.shutdown()'
   # So that the first run need not compile their modules; what fails there is that run's to tell.
   in_environment python -c 'import maglev_controller.node, maglev_plant.node, maglev_reference.node
