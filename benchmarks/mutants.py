@@ -382,9 +382,10 @@ def main() -> int:
         lived = sum(outcome.survived for outcome in its)
         print(f'{module:40} {len(its):4} mutants, {lived:3} survived')
     lived = sum(outcome.survived for outcome in outcomes)
-    share, spent = lived / len(outcomes), sum(outcome.seconds for outcome in outcomes)
+    judged = max(len(outcomes), 1)
+    share, spent = lived / judged, sum(outcome.seconds for outcome in outcomes)
     print(f'{lived} of {len(outcomes)} survived: {100 * share:.1f} %, ', end='')
-    print(f'{spent / len(outcomes):.0f} s each')
+    print(f'{spent / judged:.0f} s each')
     return int(share > ALLOWED)
 
 

@@ -71,7 +71,7 @@ class Flight(NamedTuple):
                 arguments += ['--params-file', file]
         for each in nodes:
             own = f'effective_parameters:={self.out}/params/{each}.yaml'
-            for value in (own, *self._values(node if node == 'stage' else each)):
+            for value in (own, *self._values(each)):
                 arguments += ['-p', f'{each}:{value}' if len(nodes) > 1 else value]
         return arguments
 
