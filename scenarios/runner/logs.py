@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from runner.console import complain, say
-from runner.process import NOT_OURS, last_words
+from runner.process import last_words
 
 _LOGGED = re.compile(r'(WARN|ERROR|FATAL) \S+ (.*)')  # as ENVIRONMENT has nodes write it
 _QUIET = re.compile(r'(INFO|DEBUG) \d')  # which stays in the log
@@ -23,7 +23,7 @@ class Tail:
         self._position = 0
 
     def lines(self, rest: bool = False) -> Iterator[str]:
-        """Whole lines of the program's own; with ``rest`` the last one without its end too."""
+        """Whole lines; with ``rest`` the last one without its end too."""
         try:
             with self._path.open('rb') as file:
                 file.seek(self._position)
@@ -33,9 +33,7 @@ class Tail:
         if not rest:
             new = new[: new.rfind(b'\n') + 1]
         self._position += len(new)
-        for line in new.decode(errors='replace').splitlines():
-            if not line.startswith(NOT_OURS):
-                yield line
+        yield from new.decode(errors='replace').splitlines()
 
 
 class NodeLog:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import re
+import shutil
 import signal
 import subprocess
 import time
@@ -22,8 +23,6 @@ ENVIRONMENT = {
     'RCUTILS_LOGGING_USE_STDOUT': '0',
     'RCUTILS_CONSOLE_OUTPUT_FORMAT': '{severity} {time} {message}',
 }
-NOT_OURS = '[ros2run]'
-"""How a line begins that the program has not written itself."""
 
 
 def installed(package: str, executable: str) -> str:
@@ -39,17 +38,12 @@ def installed(package: str, executable: str) -> str:
 
 
 def program(package: str, executable: str) -> list[str]:
-    """How to run an executable so that it ends when the runner does, even by SIGKILL."""
-    path = installed(package, executable)
-    bound = ['setpriv', '--pdeathsig', 'TERM'] if _on_path('setpriv') else []
-    if not _on_path('ros2'):
-        return [*bound, path]
-    prefix = ['--prefix', ' '.join(bound)] if bound else []
-    return [*bound, 'ros2', 'run', *prefix, package, executable]
+    """How to run an executable so that it ends when the runner does, even by SIGKILL.
 
-
-def _on_path(name: str) -> bool:
-    return any(os.access(f'{folder}/{name}', os.X_OK) for folder in os.get_exec_path())
+    It is what ``ros2 run`` runs, without the wait for that.
+    """
+    bound = ['setpriv', '--pdeathsig', 'TERM'] if shutil.which('setpriv') else []
+    return [*bound, installed(package, executable)]
 
 
 class Process:
@@ -106,6 +100,6 @@ def last_words(log: Path) -> str:
         text = log.read_text(errors='replace')
     except OSError:
         return ''
-    lines = [line for line in text.splitlines() if line.strip() and not line.startswith(NOT_OURS)]
+    lines = [line for line in text.splitlines() if line.strip()]
     reasons = [line for line in lines if re.search('error|fatal|refused', line, re.IGNORECASE)]
     return (reasons or lines or [''])[-1]

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import nullcontext
 from types import SimpleNamespace
 from typing import Any
 
@@ -53,6 +54,7 @@ class Node:
 def handlers(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """No middleware, and the handlers of before afterwards."""
     monkeypatch.setattr(process, 'prepare_middleware', lambda: None)
+    monkeypatch.setattr(process, 'looking_around', lambda _name: nullcontext())
     monkeypatch.setattr(process.rclpy, 'init', lambda **_: None)
     monkeypatch.setattr(process.rclpy, 'try_shutdown', lambda: None)
     before = [signal.getsignal(number) for number in ENDING]

@@ -6,12 +6,16 @@ import pytest
 from source_tree import PACKAGES, PURE, imported, modules, top_level
 
 NODES = {
+    'maglev_controller.executables',
     'maglev_controller.node',
     'maglev_monitor.bag.recorder',
-    'maglev_monitor.watchers',
+    'maglev_monitor.executables',
     'maglev_monitor.live.node',
+    'maglev_plant.executables',
     'maglev_plant.node',
+    'maglev_reference.executables',
     'maglev_reference.node',
+    'maglev_view.executables',
     'maglev_view.messages',
     'maglev_view.node',
     'maglev_view.web.calls',

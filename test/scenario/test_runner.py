@@ -16,26 +16,6 @@ from stand_ins import Tree
 from runner import options, process
 from runner.folder import make_folder
 
-# As the real one: waits for its child, also through Ctrl-C, which the child has seen as well.
-ROS2 = r"""#!/usr/bin/env python3
-import subprocess
-import sys
-
-assert sys.argv[1:3] == ['run', '--prefix'], sys.argv
-package, executable = sys.argv[4:6]
-print('[ros2run]: this is not the node')
-with open('@TREE@/ros2', 'a') as file:
-    print(*sys.argv[4:], file=file)
-path = f'@TREE@/prefix/lib/{package}/{executable}'
-process = subprocess.Popen([*sys.argv[3].split(), path, *sys.argv[6:]])
-while process.returncode is None:
-    try:
-        process.communicate()
-    except KeyboardInterrupt:
-        pass
-sys.exit(process.returncode)
-"""
-
 
 def test_a_run_that_passes(tree: Tree) -> None:
     code, output = tree.run()
@@ -146,16 +126,6 @@ def test_a_node_that_will_not_stop_is_killed(tree: Tree) -> None:
     code, output = tree.run()
     assert code == 1
     assert 'stage did not end cleanly, exit code 137' in output
-    assert tree.alive() == []
-
-
-def test_ros2_run_is_used_where_it_is(tree: Tree) -> None:
-    tree.script(tree.path / 'bin' / 'ros2', ROS2)
-    code, output = tree.run()
-    assert code == 0, output
-    assert 'maglev_reference reference --ros-args' in (tree.path / 'ros2').read_text()
-    assert 'this is not the node' not in output
-    assert tree.ended() == ['reference', 'controller', 'plant', 'watchers', 'view']
     assert tree.alive() == []
 
 

@@ -14,7 +14,7 @@ from runner import logs, process
     ('log', 'words'),
     [
         ('[INFO] up\nFATAL: no encoder\nit ends\n\n', 'FATAL: no encoder'),
-        ('[INFO] up\nlast\n[ros2run]: error: process exited\n', 'last'),
+        ('[INFO] up\nlast\n', 'last'),
         ('\n', ''),
     ],
 )
@@ -75,7 +75,7 @@ def test_progress_is_shown_in_whole_lines(
     progress = logs.NodeLog('ellipse: watchers', log, everything=True)
     progress.show()
     shown = []
-    for text in ('y 3.0', ' um\nx', ' 4\n[ros2run]: hm\n', 'last'):
+    for text in ('y 3.0', ' um\nx', ' 4\n', 'last'):
         with log.open('a') as file:
             file.write(text)
         progress.show()

@@ -6,9 +6,10 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from maglev_controller import node, supervision
+from maglev_controller import supervision
 from maglev_controller.node import ControllerNode
 from maglev_msgs.msg import Measurement
+from maglev_node.process import main
 
 FROM = 1200
 
@@ -53,4 +54,4 @@ def _fail(step: Callable[..., None]) -> Callable[..., None]:
 if __name__ == '__main__':
     how = sys.argv[1]
     supervision.Supervisor.step = _fail(supervision.Supervisor.step)  # type: ignore[method-assign]
-    node.run_main('controller', _Failing)
+    main('controller', _Failing)

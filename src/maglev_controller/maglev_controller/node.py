@@ -20,7 +20,6 @@ from maglev_model.phases import Phase
 from maglev_node.graph_guard import GraphGuard, Watchers
 from maglev_node.mode_check import mode_conflict
 from maglev_node.node import MaglevNode, SourceParameters
-from maglev_node.process import main as run_main
 from maglev_node.samples import SampleQueue, SampleWriter, hear
 from maglev_node.topics import (
     CONTROLLER_STATE,
@@ -388,12 +387,3 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         if self.supervisor.flying:
             self.supervisor.give_up('shut down')
             self._publish_currents(self._sequence)
-
-
-def main() -> None:
-    """Entry point of the executable ``controller``."""
-    run_main('controller', ControllerNode)
-
-
-if __name__ == '__main__':
-    main()

@@ -15,7 +15,6 @@ from maglev_hw_bridge.stage import BridgeStage, Mode
 from maglev_model.parameters import parameter
 from maglev_model.stage import StageError
 from maglev_node.node import NodeError
-from maglev_node.process import main as run_main
 from maglev_node.stage_node import StageNode
 from maglev_node.stage_parameters import StageNodeParameters
 from maglev_node.topics import TRUE_STATE
@@ -135,12 +134,3 @@ class BridgeNode(StageNode[BridgeNodeParameters, BridgeStage]):
         if self.state == 'active' and stage.mode is not Mode.FOLLOWING:
             return DiagnosticStatus.WARN, f'{stage.mode.value}: {stage.why}', facts
         return level, message, facts
-
-
-def main() -> None:
-    """Entry point of the executable ``hw_bridge``."""
-    run_main('hw_bridge', BridgeNode)
-
-
-if __name__ == '__main__':
-    main()

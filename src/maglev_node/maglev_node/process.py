@@ -5,10 +5,12 @@ from __future__ import annotations
 import faulthandler
 import gc
 import os
+import pkgutil
 import signal
 import sys
 import time
 from collections.abc import Callable, Iterable, Sequence, Sized
+from functools import partial
 from typing import Any, cast
 
 import rclpy
@@ -20,6 +22,7 @@ from maglev_model.command import leave_with
 from maglev_model.parameters import ParameterError
 from maglev_node.dds import prepare_middleware
 from maglev_node.node import MaglevNode, NodeError, spin
+from maglev_node.presence import looking_around
 from maglev_node.usage import usage
 
 _DELIVERY_TIME = 0.5
@@ -57,8 +60,9 @@ def run(name: str, *make_nodes: Callable[[], MaglevNode[Any]]) -> int:
     prepare_middleware()
     try:
         rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
-        for make in make_nodes:
-            nodes.append(make())
+        with looking_around(name):
+            for make in make_nodes:
+                nodes.append(make())
         gc.collect()
         gc.freeze()
         _spin(nodes, caught)
@@ -90,26 +94,36 @@ def _spin(nodes: Sequence[MaglevNode[Any]], caught: Sized) -> None:
         spin(nodes, stop)
 
 
-def main(name: str, *nodes: type[MaglevNode[Any]], background: bool = False) -> None:
+def main(name: str, *nodes: str | type[MaglevNode[Any]], background: bool = False) -> None:
     """Entry point of an executable: run its nodes and leave with their exit code.
 
-    With ``--help`` or ``-h`` it only says what they are. Nodes in the background yield to those of
-    the loop when they want the same core. Several are for what only watches: those of the loop take
-    their real-time priority, and land, each in a process of its own.
+    Each is a class, or ``package.module:Class``, which is then imported when the process is on the
+    graph already. With ``--help`` or ``-h`` it only says what they are. Nodes in the background
+    yield to those of the loop when they want the same core. Several are for what only watches:
+    those of the loop take their real-time priority, and land, each in a process of its own.
     Leaves without the interpreter's own teardown, which may block in the middleware.
     """
     if {'-h', '--help'} & set(sys.argv[1:]):
-        leave_with(lambda: _help(name, nodes))
+        leave_with(lambda: _help(name, [_load(node) for node in nodes]))
     if background:
         os.nice(_BACKGROUND_NICENESS)
     try:
-        code = run(name, *cast(Sequence[Callable[[], MaglevNode[Any]]], nodes))
+        code = run(name, *(partial(_make, node) for node in nodes))
     except Exception:
         sys.excepthook(*sys.exc_info())
         code = 70
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(code)
+
+
+def _load(node: str | type[MaglevNode[Any]]) -> type[MaglevNode[Any]]:
+    return pkgutil.resolve_name(node) if isinstance(node, str) else node
+
+
+def _make(node: str | type[MaglevNode[Any]]) -> MaglevNode[Any]:
+    make = cast(Callable[[], MaglevNode[Any]], _load(node))
+    return make()
 
 
 def _help(name: str, nodes: Iterable[type[MaglevNode[Any]]]) -> int:

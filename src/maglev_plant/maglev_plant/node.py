@@ -6,7 +6,6 @@ import dataclasses
 from collections.abc import Mapping
 from typing import ClassVar
 
-from maglev_node.process import main as run_main
 from maglev_node.stage_node import StageNode
 from maglev_node.stage_parameters import ClockedStageParameters
 from maglev_node.topics import TRUE_STATE
@@ -35,12 +34,3 @@ class PlantNode(StageNode[PlantNodeParameters, SimulatedStage]):
         super().on_parameters(parameters)
         if self.configured:
             self.stage.watchdog = parameters.watchdog
-
-
-def main() -> None:
-    """Entry point of the executable ``plant``."""
-    run_main('plant', PlantNode)
-
-
-if __name__ == '__main__':
-    main()

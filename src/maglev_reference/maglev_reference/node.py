@@ -22,7 +22,6 @@ from maglev_msgs.srv import Step
 from maglev_node.graph_guard import GraphGuard, Watchers
 from maglev_node.mode_check import mode_conflict
 from maglev_node.node import MaglevNode, SourceParameters
-from maglev_node.process import main as run_main
 from maglev_node.samples import SampleQueue, SampleWriter
 from maglev_node.topics import (
     CONTROLLER_STATE,
@@ -365,12 +364,3 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
 def _point(given: Any) -> Point:
     time = given.time_from_start.sec + 1e-9 * given.time_from_start.nanosec
     return Point(time, given.positions, given.velocities, given.accelerations)
-
-
-def main() -> None:
-    """Entry point of the executable ``reference``."""
-    run_main('reference', ReferenceNode)
-
-
-if __name__ == '__main__':
-    main()

@@ -22,7 +22,6 @@ from maglev_model.geometry import outputs_of_gaps
 from maglev_node.graph_guard import GraphGuard
 from maglev_node.node import MaglevNode, NodeParameters
 from maglev_node.polling import PolledSubscription
-from maglev_node.process import main as run_main
 from maglev_node.stamp import nanoseconds
 from maglev_node.topics import CONTROLLER_STATE, CURRENTS, MEASUREMENT, SAMPLE_TOPICS
 from maglev_view import messages
@@ -199,12 +198,3 @@ class ViewNode(MaglevNode[ViewNodeParameters]):
             self._track.add(where, lambda: messages.pose(stamp, reference))
             if self._paths.due(time):
                 self._outlets[REFERENCE_PATH].publish(messages.path(stamp, self._track.points))
-
-
-def main() -> None:
-    """Entry point of the executable."""
-    run_main('view', ViewNode, background=True)
-
-
-if __name__ == '__main__':
-    main()

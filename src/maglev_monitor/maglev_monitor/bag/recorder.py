@@ -28,7 +28,6 @@ from maglev_monitor.bag.log_time import LogTimes
 from maglev_monitor.bag.writer import BagWriter
 from maglev_node.node import MaglevNode, NodeError, NodeParameters
 from maglev_node.polling import PolledSubscription
-from maglev_node.process import main as run_main
 from maglev_node.topics import DIAGNOSTICS, SAMPLE_TOPICS
 
 TOPICS: dict[str, type] = {
@@ -167,12 +166,3 @@ def bag_qos(profile: QoSProfile) -> Qos:
 
 def _bag_time(nanoseconds: int) -> QosTime:
     return QosTime(*divmod(nanoseconds, 1_000_000_000))
-
-
-def main() -> None:
-    """Entry point of the executable."""
-    run_main('recorder', RecorderNode, background=True)
-
-
-if __name__ == '__main__':
-    main()

@@ -20,7 +20,6 @@ from maglev_monitor.report.terminal import as_text
 from maglev_node import topics
 from maglev_node.node import MaglevNode, NodeError, NodeParameters
 from maglev_node.polling import PolledSubscription
-from maglev_node.process import main as run_main
 from maglev_node.stamp import nanoseconds
 from maglev_node.topics import KEYS
 
@@ -165,12 +164,3 @@ class MonitorNode(MaglevNode[MonitorParameters]):
         if self._watch.started:
             print(as_text(result), flush=True)
         return str(result['verdict'])
-
-
-def main() -> None:
-    """Entry point of the executable."""
-    run_main('monitor', MonitorNode, background=True)
-
-
-if __name__ == '__main__':
-    main()

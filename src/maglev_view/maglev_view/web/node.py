@@ -12,7 +12,6 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from maglev_model.wire import DecodeError
 from maglev_monitor.metrics.decoding import decode
 from maglev_node.node import MaglevNode, NodeError, NodeParameters
-from maglev_node.process import main as run_main
 from maglev_node.topics import (
     CONTROLLER_STATE,
     DIAGNOSTICS,
@@ -100,12 +99,3 @@ def _qos(depth: int) -> QoSProfile:
         reliability=ReliabilityPolicy.BEST_EFFORT,  # nobody repeats a sample for a view
         durability=DurabilityPolicy.VOLATILE,
     )
-
-
-def main() -> None:
-    """Entry point of the executable."""
-    run_main('web', WebNode, background=True)
-
-
-if __name__ == '__main__':
-    main()

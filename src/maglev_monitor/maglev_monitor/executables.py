@@ -1,0 +1,26 @@
+"""What ``ros2 run maglev_monitor`` runs: nodes, by where they are, which is loaded last."""
+
+from __future__ import annotations
+
+from maglev_node.process import main
+
+_MONITOR = 'maglev_monitor.live.node:MonitorNode'
+_RECORDER = 'maglev_monitor.bag.recorder:RecorderNode'
+
+
+def monitor() -> None:
+    """Entry point of the executable ``monitor``."""
+    main('monitor', _MONITOR, background=True)
+
+
+def recorder() -> None:
+    """Entry point of the executable ``recorder``."""
+    main('recorder', _RECORDER, background=True)
+
+
+def watchers() -> None:
+    """Entry point of the executable ``watchers``: recorder and monitor in one process.
+
+    To each of which the middleware then brings a message once.
+    """
+    main('watchers', _RECORDER, _MONITOR, background=True)
