@@ -8,6 +8,7 @@ import pytest
 from maglev_hw_bridge import guard, guard_arrays, observer
 from maglev_hw_bridge.amplifiers import Amplifiers
 from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.standing_still import SETTLING, look
 from maglev_model.axes import PHI, THETA, X, Y, Z
 from maglev_model.machine import machine_constants
 from maglev_model.platen import output_accelerations
@@ -135,6 +136,18 @@ def test_x_is_missed_near_the_lower_stop_too_when_a_gap_is_lost(
         judge.watch(length, amplifiers.arrays.current, True)
         blamed += judge.blamed
     assert blamed == found
+
+
+@pytest.mark.parametrize('rate', [0.0, 0.05, -0.1])
+@pytest.mark.parametrize('along', [X, Z])
+def test_what_may_be_held_has_moved_no_way_unseen(along: int, rate: float) -> None:
+    """Before friction held it, it may have gone as far as less than a count."""
+    watched = guard.Guard(PARAMETERS).arrays
+    watched.samples = SETTLING
+    watched.least_rate[along], watched.unseen[3 + along] = rate, 2e-5
+    look(watched.block[0], True, np.zeros(6, np.bool_))
+    unseen = 2e-5 + rate * PARAMETERS.sample_time if rate else 0.0
+    assert watched.unseen[3 + along] == pytest.approx(unseen, abs=1e-15)
 
 
 @pytest.mark.parametrize('along', [X, Z])

@@ -134,6 +134,26 @@ def test_levitation_comes_first(output: np.ndarray, horizontal: tuple[float, flo
         assert abs(answer.plant[axis]) <= abs(wanted[axis]) * (1.0 + 1e-9)
 
 
+@settings(max_examples=100, deadline=None)
+@given(
+    output=outputs,
+    wanted=rough,
+    pushes=st.tuples(st.floats(0, 300), st.floats(0, 300)),
+    ways=st.sampled_from([(1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)]),
+)
+def test_a_push_the_other_way_turns_the_quadrature_current_alone(
+    output: np.ndarray, wanted: np.ndarray, pushes: tuple[float, float], ways: tuple[float, float]
+) -> None:
+    """By (1), (2): the attraction knows i_q by its square, beyond what is possible too."""
+    there, other = wanted.copy(), wanted.copy()
+    there[1:3], other[1:3] = pushes, np.multiply(ways, pushes)
+    one, two = (Answered(exact_inverse, PRIORITY, output, each) for each in (there, other))
+    turned = np.array([ways[1], ways[0], ways[1], ways[0]])
+    np.testing.assert_allclose(two.direct, one.direct, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(two.quadrature, turned * one.quadrature, rtol=1e-12, atol=1e-12)
+    assert one.limited_by == two.limited_by
+
+
 def test_without_priority_a_large_quadrature_current_costs_levitation() -> None:
     """Why there is one: i_q attracts, and at 7 A nothing is left to lower the attraction."""
     output, wanted = np.array([0.025, 0.0, 0.0, 0.0, 0.0]), np.array([0.0, 100.0, 0.0, 0.0, 0.0])
@@ -278,6 +298,14 @@ def test_tilted_y_without_control_is_left_to_the_magnets() -> None:
     accelerations(MACHINE, state, none, none, alone)
     assert answer.plant[0] == pytest.approx(alone[0], rel=1e-9)
     assert answer.plant[3:] == pytest.approx([0.0, 0.0], abs=1e-9)
+
+
+def test_no_attraction_at_all_is_possible() -> None:
+    """Free fall, where no least attraction is kept: the currents make up for the magnets."""
+    wanted = np.array([MACHINE.G, 0.0, 0.0, 0.0, 0.0])
+    answer = Answered(exact_inverse, WIDE, np.array([0.025, 0.0, 0.0, 0.0, 0.0]), wanted)
+    assert answer.limited_by == 0
+    assert answer.plant == pytest.approx(wanted, abs=1e-9)
 
 
 @pytest.mark.parametrize('tilts', [0.0, 1.0])
