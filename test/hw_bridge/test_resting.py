@@ -153,16 +153,19 @@ def test_a_corner_that_leaves_the_stop_is_enough(
 
 @pytest.mark.parametrize('axis', [3, 4])
 @pytest.mark.parametrize('sign', [-1.0, 1.0])
-@pytest.mark.parametrize(('rising', 'left'), [(4e-3, False), (0.012, True)])
+@pytest.mark.parametrize(
+    ('off', 'rising', 'left'),
+    [(1.5e-4, 4e-3, False), (1.5e-4, 0.012, True), (2.9e-4, 0.0, False), (3.1e-4, 0.0, True)],
+)
 def test_a_corner_that_will_soon_be_off_the_stop_is_enough(
-    axis: int, sign: float, rising: float, left: bool
+    axis: int, sign: float, off: float, rising: float, left: bool
 ) -> None:
-    """A corner that is 0.15 mm off and rises at so many m/s, about the middle that stays."""
+    """A corner that is so far off and rises at so many m/s, about the middle that stays."""
     flight = Flight(hover(LOWER_STOP))
     flight.run(20, controlled=False)
     state, radius = flight.stage.guard.arrays, flight.stage.parameters.machine.radius
     corner = np.array([[-1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, -1.0]])[axis - 3]
-    state.length[:4] = LOWER_STOP - 1.5e-4 * sign * corner
+    state.length[:4] = LOWER_STOP - off * sign * corner
     state.rate[:] = 0.0
     state.rate[axis] = -sign * rising / radius
     assert flight.stage._leaves() == left
@@ -181,7 +184,7 @@ def test_what_was_moved_while_nobody_looked_has_not_left_its_stop() -> None:
 
 
 @pytest.mark.parametrize(
-    ('axis', 'way', 'slid'), [(1, 2e-4, False), (1, -4e-4, True), (2, 4e-4, True)]
+    ('axis', 'way', 'slid'), [(1, 2.8e-4, False), (1, -3.2e-4, True), (2, 3.2e-4, True)]
 )
 @pytest.mark.parametrize('parked', [50, 150])
 def test_a_platen_that_slides_along_without_current_is_a_fault(
