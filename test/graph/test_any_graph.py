@@ -235,7 +235,7 @@ def test_help_that_nobody_reads_to_its_end(package: str, name: str) -> None:
 
 
 def test_a_module_is_the_node_itself() -> None:
-    command = [sys.executable, '-m', 'maglev_plant.node', '-h']
+    command = [sys.executable, '-m', 'maglev_plant.executables', '-h']
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stderr) == (0, '')
     assert 'usage: plant ' in done.stdout

@@ -8,3 +8,7 @@ from maglev_node.process import main
 def controller() -> None:
     """Entry point of the executable ``controller``."""
     main('controller', 'maglev_controller.node:ControllerNode')
+
+
+if __name__ == '__main__':
+    controller()

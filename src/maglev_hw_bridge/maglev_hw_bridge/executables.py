@@ -8,3 +8,7 @@ from maglev_node.process import main
 def hw_bridge() -> None:
     """Entry point of the executable ``hw_bridge``."""
     main('hw_bridge', 'maglev_hw_bridge.node:BridgeNode')
+
+
+if __name__ == '__main__':
+    hw_bridge()

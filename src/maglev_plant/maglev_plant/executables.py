@@ -8,3 +8,7 @@ from maglev_node.process import main
 def plant() -> None:
     """Entry point of the executable ``plant``."""
     main('plant', 'maglev_plant.node:PlantNode')
+
+
+if __name__ == '__main__':
+    plant()

@@ -8,3 +8,7 @@ from maglev_node.process import main
 def reference() -> None:
     """Entry point of the executable ``reference``."""
     main('reference', 'maglev_reference.node:ReferenceNode')
+
+
+if __name__ == '__main__':
+    reference()
