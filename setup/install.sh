@@ -32,7 +32,8 @@ find_keys() {
   # Numba sees a change of a function's own file only, not of what it calls: another cache for each
   # state of the sources, or a run would silently use old code.
   sums=$(find src -regex 'src/maglev_\(model\|plant\|controller\|hw_bridge\|study\)/.*\.py' \
-    ! -name node.py -print0 | sort -z | xargs -0r sha256sum | sha256sum)
+    ! -name node.py ! -name executables.py -print0 | sort -z | xargs -0r sha256sum |
+    sha256sum)
   sources=${sums:0:16}
   sums=$(sha256sum setup/requirements-view.txt)
   view_key="$environment_key ${sums%% *}"
