@@ -7,8 +7,9 @@ Beside it: a busy process for each core, one that fills and frees 400 MB over an
 strangers on every topic of the stage, and 20 MB a second of somebody else's messages. Prints
 memory of each node at the beginning and the end, how it and the open files grew, late samples and
 errors, and beside them how late the machine itself was: what keeps a thread of the highest priority
-waiting, no node can do without. Errors are held to 1 mm and 1 mrad only. Exits with 1 when the run
-did not pass, lost a message, or a node grew.
+waiting, no node can do without. Where the kernel grants real-time threads a part of each processor
+only, it takes the rest in one piece, 50 ms of a second by default. Errors are held to 1 mm and 1
+mrad only. Exits with 1 when the run did not pass, lost a message, or a node grew.
 """
 
 from __future__ import annotations
@@ -131,6 +132,18 @@ def growth(held: list[Look]) -> tuple[float, int]:
     return memory, min(one.files for one in end) - min(one.files for one in begin)
 
 
+def granted() -> str:
+    """How much of a processor the kernel leaves to real-time threads."""
+    try:
+        runtime, period = (
+            int(Path(f'/proc/sys/kernel/sched_rt_{name}_us').read_text())
+            for name in ('runtime', 'period')
+        )
+    except OSError:
+        return 'an unknown part of each processor'
+    return 'all of each processor' if runtime < 0 else f'{runtime / period:.0%} of each processor'
+
+
 def wrong_with(held: dict[str, list[Look]], metrics: dict[str, Any], hours: float) -> list[str]:
     """What is not as it shall be."""
     wrong = [] if metrics['verdict'] == 'pass' else [f'the run says: {metrics["reasons"]}']
@@ -169,6 +182,7 @@ def main() -> int:
             f'{files:+d} files; {looks[-1].threads} threads'
         )
     print(f'the machine kept a thread of the highest priority waiting for {witness.worst:.4f} s')
+    print(f'the kernel grants real-time threads {granted()}')
     print('timing', json.dumps(metrics['timing']), 'missing', metrics['missing_samples'])
     print('errors', json.dumps(metrics['own_axes']))
     wrong = wrong_with(held, metrics, asked.minutes / 60)
