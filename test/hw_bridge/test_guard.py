@@ -8,7 +8,7 @@ import pytest
 from maglev_hw_bridge import guard, guard_arrays, observer
 from maglev_hw_bridge.amplifiers import Amplifiers
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_hw_bridge.standing_still import SETTLING, look
+from maglev_hw_bridge.standing_still import SETTLING, call_the_roll, look
 from maglev_model.axes import PHI, THETA, X, Y, Z
 from maglev_model.machine import machine_constants
 from maglev_model.platen import output_accelerations
@@ -148,6 +148,17 @@ def test_what_may_be_held_has_moved_no_way_unseen(along: int, rate: float) -> No
     look(watched.block[0], True, np.zeros(6, np.bool_))
     unseen = 2e-5 + rate * PARAMETERS.sample_time if rate else 0.0
     assert watched.unseen[3 + along] == pytest.approx(unseen, abs=1e-15)
+
+
+@pytest.mark.parametrize(('y', 'answered'), [(PARAMETERS.machine.gap_max, 0), (0.025, 1)])
+def test_each_lift_off_calls_the_roll_anew(y: float, answered: int) -> None:
+    """Who answered before has not answered this one; in the air nobody is called."""
+    watched = guard.Guard(PARAMETERS).arrays
+    observer.start(watched.block[0], np.array([y, y, y, y, 0.0, 0.0]))
+    watched.answered[:], watched.left[:] = 1 - answered, 1e-4
+    assert not call_the_roll(watched.block[0], False, np.zeros(6, np.bool_))
+    assert np.all(watched.answered == answered)
+    assert np.all(watched.left == 0.0)
 
 
 @pytest.mark.parametrize('along', [X, Z])

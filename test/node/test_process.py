@@ -54,7 +54,7 @@ class Node:
 def handlers(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """No middleware, and the handlers of before afterwards."""
     monkeypatch.setattr(process, 'prepare_middleware', lambda: None)
-    monkeypatch.setattr(process, 'looking_around', lambda _name: nullcontext())
+    monkeypatch.setattr(process, 'discovering', lambda _name: nullcontext())
     monkeypatch.setattr(process.rclpy, 'init', lambda **_: None)
     monkeypatch.setattr(process.rclpy, 'try_shutdown', lambda: None)
     before = [signal.getsignal(number) for number in ENDING]

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterable
 from typing import Any
 
 from rclpy.node import Node
+from rclpy.timer import Timer
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from maglev_node.node import MaglevNode, NodeError
@@ -15,7 +17,7 @@ DISCOVERY_TIME = 1.0
 """How long a node looks for others of its kind before it takes its place on the graph [s]."""
 
 _PROBATION = 5.0
-"""How long it goes on looking afterwards, and is the one to leave [s]."""
+"""How long it goes on looking from when it has, and is the one to leave [s]."""
 
 _LOOK_PERIOD = 0.25  # [s]
 _MATCHING = 0.1  # at most, from when the graph shows a subscription to when it gets messages [s]
@@ -25,28 +27,32 @@ _REMINDER = 5.0  # between two lines about who is waited for [s]
 class GraphGuard:
     """Keeps a node the only publisher of the topic it claims.
 
-    On a busy machine discovery can take longer than :data:`DISCOVERY_TIME`, so the node goes on
-    looking for its first seconds, and leaves when it finds another then.
+    On a busy machine discovery can take longer than :data:`DISCOVERY_TIME`, and two may claim it at
+    once, so the node goes on looking for some seconds, and leaves when it finds another then.
     """
 
     def __init__(self, node: MaglevNode[Any]) -> None:
         self._node = node
         self._topic = self._kind = ''
+        self._claimed = -math.inf  # when [s, monotonic]
+        self._timer: Timer | None = None
 
     def claim(self, topic: str, kind: str) -> None:
         """Be the only publisher of a topic: raise NodeError when another node publishes it.
 
         Called before the publisher is made; waits until discovery has had :data:`DISCOVERY_TIME`
-        since the node came up. ``kind`` names the node in messages.
+        since it began. ``kind`` names the node in messages.
         """
-        while self._age < DISCOVERY_TIME:
+        while time.monotonic() - self._node.discovering_since < DISCOVERY_TIME:
             time.sleep(0.02)
         publishers = self._node.get_publishers_info_by_topic(topic)
         if publishers:
             raise NodeError(self._taken(topic, kind, publishers[0]))
-        first_claim = not self._topic
         self._topic, self._kind = topic, kind
-        if first_claim:
+        self._claimed = time.monotonic()
+        if self._timer is not None:
+            self._timer.reset()
+        else:
             self._timer = self._node.create_timer(
                 _LOOK_PERIOD, self._look_again, clock=self._node.steady_clock
             )
@@ -59,16 +65,12 @@ class GraphGuard:
         return len(publishers) <= 1
 
     def on_probation(self) -> bool:
-        """Whether the node is so young that another of its kind may yet be discovered."""
-        return self._age < _PROBATION
-
-    @property
-    def _age(self) -> float:
-        return time.monotonic() - self._node.came_up
+        """Whether the claim is so young that another of its kind may yet be discovered."""
+        return time.monotonic() - self._claimed < _PROBATION
 
     def _look_again(self) -> None:
         self.alone()
-        if not self.on_probation():
+        if self._timer is not None and not self.on_probation():
             self._timer.cancel()
 
     def _taken(self, topic: str, kind: str, who: TopicEndpointInfo) -> str:

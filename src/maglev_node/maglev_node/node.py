@@ -18,7 +18,7 @@ from rclpy.time_source import CLOCK_TOPIC
 
 from maglev_model import parameters as table
 from maglev_model.parameters import ParameterError, parameter
-from maglev_node import presence, realtime, ros_parameters
+from maglev_node import discovery, realtime, ros_parameters
 from maglev_node.polling import PollingNode
 from maglev_node.topics import CLOCK, DIAGNOSTICS
 
@@ -85,7 +85,8 @@ class MaglevNode(PollingNode, Generic[P]):
         self.exit_code: int | None = None
         self.failed = False
         """Whether what is wrong was said by :meth:`fail`."""
-        self.came_up = presence.since()
+        self.discovering_since = discovery.begun()
+        """When the middleware began to find who else is on the graph [s, monotonic]."""
         self._said_refused = False
         self._diagnostics = self.create_publisher(DiagnosticArray, DIAGNOSTICS, 10)
         self.create_timer(1.0, self._publish_diagnostics, clock=self.steady_clock)

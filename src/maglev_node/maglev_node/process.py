@@ -11,7 +11,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Sequence, Sized
 from functools import partial
-from typing import Any, cast
+from typing import Any
 
 import rclpy
 from rclpy.duration import Duration
@@ -21,8 +21,8 @@ from rclpy.signals import SignalHandlerOptions
 from maglev_model.command import leave_with
 from maglev_model.parameters import ParameterError
 from maglev_node.dds import prepare_middleware
+from maglev_node.discovery import discovering
 from maglev_node.node import MaglevNode, NodeError, spin
-from maglev_node.presence import looking_around
 from maglev_node.usage import usage
 
 _DELIVERY_TIME = 0.5
@@ -60,7 +60,7 @@ def run(name: str, *make_nodes: Callable[[], MaglevNode[Any]]) -> int:
     prepare_middleware()
     try:
         rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
-        with looking_around(name):
+        with discovering(name):
             for make in make_nodes:
                 nodes.append(make())
         gc.collect()
@@ -117,13 +117,13 @@ def main(name: str, *nodes: str | type[MaglevNode[Any]], background: bool = Fals
     os._exit(code)
 
 
-def _load(node: str | type[MaglevNode[Any]]) -> type[MaglevNode[Any]]:
+def _load(node: str | type[MaglevNode[Any]]) -> Any:
     return pkgutil.resolve_name(node) if isinstance(node, str) else node
 
 
 def _make(node: str | type[MaglevNode[Any]]) -> MaglevNode[Any]:
-    make = cast(Callable[[], MaglevNode[Any]], _load(node))
-    return make()
+    made: MaglevNode[Any] = _load(node)()
+    return made
 
 
 def _help(name: str, nodes: Iterable[type[MaglevNode[Any]]]) -> int:

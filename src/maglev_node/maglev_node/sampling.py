@@ -148,7 +148,7 @@ class Sampling(Generic[P, S]):
             return
         waited = time.monotonic() - self._sample_time
         if not self.answered:
-            self._publisher.watched()  # from when on they are there tells when they hear
+            self._publisher.watched()  # they match while nobody answers yet
             self._publish()
         elif waited > self._node.parameters.answer_timeout:
             who = (

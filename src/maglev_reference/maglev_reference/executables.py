@@ -1,4 +1,4 @@
-"""What ``ros2 run maglev_reference`` runs: nodes, by where they are, which is loaded last."""
+"""Entry points of the nodes, each of which is imported when its process is on the graph."""
 
 from __future__ import annotations
 

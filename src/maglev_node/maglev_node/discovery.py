@@ -1,4 +1,4 @@
-"""A process on the graph before its nodes are, which take their time to load."""
+"""Discovery that begins before a process has its nodes, which take their time to load."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from contextlib import contextmanager
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-_since = None  # when the middleware of this process began to look around [s]
+_begun: float | None = None  # when, in this process [s]
 
 
 @contextmanager
-def looking_around(name: str) -> Iterator[None]:
-    """Be on the graph, so that the middleware finds the others meanwhile, in threads of its own.
+def discovering(name: str) -> Iterator[None]:
+    """Let the middleware, in threads of its own, find who is on the graph meanwhile.
 
     By a node that nobody asks for anything, and which ``ros2 node list`` does not show. Those that
-    are made meanwhile take over what was found.
+    are made meanwhile know what was found.
     """
-    global _since
+    global _begun
     node = Node(
         f'_{name}_loading',
         use_global_arguments=False,
@@ -27,13 +27,13 @@ def looking_around(name: str) -> Iterator[None]:
         start_parameter_services=False,
         parameter_overrides=[Parameter('start_type_description_service', value=False)],
     )
-    _since = time.monotonic()
+    _begun = time.monotonic()
     try:
         yield
     finally:
         node.destroy_node()
 
 
-def since() -> float:
-    """When the middleware began to look around [s, monotonic], now where nothing told it to."""
-    return time.monotonic() if _since is None else _since
+def begun() -> float:
+    """When discovery began in this process [s, monotonic]: now, where it begins with the node."""
+    return time.monotonic() if _begun is None else _begun

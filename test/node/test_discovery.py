@@ -29,7 +29,7 @@ time.sleep(2.0)
 class Late(node.MaglevNode):
     def __init__(self):
         super().__init__('late', node.NodeParameters)
-        self.there_for = time.monotonic() - self.came_up
+        self.there_for = time.monotonic() - self.discovering_since
         self.heard = self.get_publishers_info_by_topic('talk')
         self.create_timer(0.1, self.look, clock=self.steady_clock)
     def look(self):
