@@ -73,3 +73,20 @@ def test_each_claim_has_a_probation_of_its_own(monkeypatch: pytest.MonkeyPatch) 
     assert guard.on_probation()
     node.look()
     assert node.looks == ['off', 'on']
+
+
+def test_what_flies_stays_and_the_newcomer_leaves() -> None:
+    """A newcomer that was discovered while the first was still on probation."""
+    flies = True
+    first: Any = Node()
+    newcomer: Any = Node()
+    GraphGuard(first, lambda: flies).claim('stage/measurement', 'stage')
+    GraphGuard(newcomer, lambda: False).claim('stage/measurement', 'stage')
+    for node in (first, newcomer):
+        node.publishers = [OTHER, OTHER]
+        node.look()
+    assert first.failed == []
+    assert 'another stage' in newcomer.failed[0]
+    flies = False
+    first.look()
+    assert 'another stage' in first.failed[0]

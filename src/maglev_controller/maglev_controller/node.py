@@ -90,7 +90,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         self._passes = 0  # learned from, when last looked at
         self._logged = (self.supervisor.mode, self.supervisor.reason)
         self._session = secrets.randbits(64) | 1
-        GraphGuard(self).claim(CURRENTS, 'controller')
+        GraphGuard(self, lambda: self.supervisor.flying).claim(CURRENTS, 'controller')
         self._currents = SampleWriter(self, CURRENTS)
         self._currents['session'] = self._session
         self._state = SampleWriter(self, CONTROLLER_STATE)

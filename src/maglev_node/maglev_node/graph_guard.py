@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from rclpy.node import Node
@@ -28,11 +28,14 @@ class GraphGuard:
     """Keeps a node the only publisher of the topic it claims.
 
     On a busy machine discovery can take longer than :data:`DISCOVERY_TIME`, and two may claim it at
-    once, so the node goes on looking for some seconds, and leaves when it finds another then.
+    once, so the node goes on looking for some seconds, and leaves when it finds another then; but
+    not while it flies the platen, for the other one, which does not, finds it as well.
+
+    :param flying: whether it does.
     """
 
-    def __init__(self, node: MaglevNode[Any]) -> None:
-        self._node = node
+    def __init__(self, node: MaglevNode[Any], flying: Callable[[], bool] = lambda: False) -> None:
+        self._node, self._flying = node, flying
         self._topic = self._kind = ''
         self._claimed = -math.inf  # when [s, monotonic]
         self._timer: Timer | None = None
@@ -69,7 +72,8 @@ class GraphGuard:
         return time.monotonic() - self._claimed < _PROBATION
 
     def _look_again(self) -> None:
-        self.alone()
+        if not self._flying():
+            self.alone()
         if self._timer is not None and not self.on_probation():
             self._timer.cancel()
 

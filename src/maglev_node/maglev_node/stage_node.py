@@ -43,7 +43,7 @@ class StageNode(ManagedNode[P], Generic[P, S]):
 
     def __init__(self, name: str, parameter_table: type[P], make_stage: Callable[[P], S]) -> None:
         super().__init__(name, parameter_table)
-        self._graph = GraphGuard(self)
+        self._graph = GraphGuard(self, lambda: self.configured and self.stage.flying)
         self._make_stage = make_stage
         self._sampling: Sampling[P, S] | None = None
         self.offer('~/emergency_stop', self._emergency_stop)

@@ -99,7 +99,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
             self.get_logger().warning(line)
         for line in summary(self.parameters):
             self.get_logger().info(line)
-        self._graph = GraphGuard(self)
+        self._graph = GraphGuard(self, lambda: not self._run.grounded)
         self._graph.claim(REFERENCE, 'reference')
         self._run = ReferenceRun(self.parameters, self.parameters.lead, self.parameters.autostart)
         self._watchers = Watchers(self, self.parameters.watchers)
