@@ -27,9 +27,6 @@ def _absent(name: str) -> Iterator[None]:
 
 with _absent('coverage'):  # a tenth of a second, for what only a coverage run could want
     import numba
-    from numba.np.unsafe.ndarray import to_fixed_tuple
-
-__all__ = ['borrowing', 'compiled', 'to_fixed_tuple']
 
 Function = TypeVar('Function', bound=Callable[..., Any])
 
