@@ -41,12 +41,14 @@ def compiled(function: Function) -> Function:
 
 
 def borrowing(function: Function) -> Function:
-    """As :func:`compiled`, for a function that only borrows its arrays: a tenth faster in all.
+    """As :func:`compiled`, for a function that only borrows its arrays: a quarter faster in all.
 
     Numba does not count who holds them then. The function may neither make arrays, nor copy one
-    into a slice of another, both of which Numba refuses, and must not return one it was given.
+    into a slice of another, both of which Numba refuses, and must not return one it was given. It
+    becomes part of what calls it: else each call would copy the constants of the machine.
     """
-    return cast(Function, numba.njit(cache=True, error_model='numpy', _nrt=False)(function))
+    decorated = numba.njit(cache=True, error_model='numpy', _nrt=False, forceinline=True)
+    return cast(Function, decorated(function))
 
 
 def _cache_by_sources() -> None:
