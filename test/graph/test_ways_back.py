@@ -46,6 +46,7 @@ def test_a_controller_disabled_or_in_a_fault_is_not_flown_with(
     assert 'call /controller/enable, then /reference/lift_off' in answer.message
     samples(watching, 30)
     assert watching.call('/controller/enable', True).success
+    watching.wait(lambda: mode(watching) == ControllerState.WAITING)
     samples(watching, 30)
     assert mode(watching) == ControllerState.WAITING
     assert {message.phase for message in watching.look()[REFERENCE]} == {Reference.REST}
@@ -66,6 +67,7 @@ def test_a_controller_disabled_or_in_a_fault_is_not_flown_with(
     watching.wait(lambda: landed_without_current(watching))
     assert watching.call('/controller/reset').success
     assert watching.call('/controller/enable', True).success
+    watching.wait(lambda: mode(watching) == ControllerState.WAITING)
     samples(watching, 30)
     assert mode(watching) == ControllerState.WAITING
     assert phase(watching) == Reference.END
