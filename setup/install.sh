@@ -26,7 +26,7 @@ find_keys() {
   cd "$root"
   sums=$(sha256sum setup/{requirements{,-build,-ros},constraints-ros}.txt | sha256sum)
   environment_key="1 $branch $ros_prefix $root ${sums%% *}"
-  sums=$(sha256sum setup/*.{bash,cmake} src/*/{package.xml,CMakeLists.txt,setup.{py,cfg}} \
+  sums=$(sha256sum setup/*.{bash,cmake,py} src/*/{package.xml,CMakeLists.txt,setup.{py,cfg}} \
     src/*/{msg,srv}/* setup/tf2_msgs/{package.xml,CMakeLists.txt,msg/*} | sha256sum)
   build_key="$environment_key ${sums%% *}"
   # Numba sees a change of a function's own file only, not of what it calls: another cache for each

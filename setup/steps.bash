@@ -297,29 +297,13 @@ in_environment() {
     bash -c ". '$root/install/environment.bash' && exec \"\$@\"" - "$@"
 }
 
-# Fill the caches of compiled functions, so that the first run starts as quickly as the second. In
-# two processes, the plant first in one and last in the other, so that what both need is compiled
-# once. Only speed depends on it: a defect of the code is left for a run or the tests. The messages
-# may still be missing.
+# Compile ahead what flies, so that the first run starts as quickly as the second. In two processes,
+# the plant first in one and last in the other, so that what both need is compiled once. Only speed
+# depends on it: a defect of the code is left for a run or the tests. The messages may still be
+# missing.
 warm_up() {
-  in_packages python -c 'from maglev_controller.parameters import ControllerParameters
-from maglev_controller.supervision import Supervisor
-from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_hw_bridge.stage import BridgeStage
-from maglev_model.parameters import build
-Supervisor(ControllerParameters())
-stage = BridgeStage.ready(build(BridgeParameters, {"homing.at_start": True}))
-stage.read()
-stage.hold()
-stage.close()' &
-  in_packages python -c 'import maglev_study.closed_loop as loop
-import maglev_view.forces, numpy
-from maglev_model.machine import MachineParameters
-from maglev_reference import parameters, timeline
-loop.warm_up()
-timeline.Timeline(parameters.ReferenceParameters())
-level, none = numpy.array([0.025, 0.0, 0.0, 0.0, 0.0]), numpy.zeros(4)
-maglev_view.forces.Forces(MachineParameters()).at(level, none, none)' || echo 'not compiled'
+  in_packages python "$root/setup/compile_ahead.py" answer &
+  in_packages python "$root/setup/compile_ahead.py" stage || echo 'not compiled'
   wait $! || echo 'not compiled'
 }
 

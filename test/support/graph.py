@@ -124,7 +124,7 @@ class ForkedProcess(Process):
 def _forks() -> Any:
     """A server that starts processes; it has one thread, as what forks must."""
     context = multiprocessing.get_context('forkserver')
-    context.set_forkserver_preload([*_IMPORTED_BY_NODES, 'ready'])
+    context.set_forkserver_preload(['compiled_ahead', *_IMPORTED_BY_NODES, 'ready'])
     given = os.environ.get('PYTHONPATH', '')
     os.environ['PYTHONPATH'] = f'{ROOT / "test" / "support"}:{given}'  # or it would not find ours
     forkserver.ensure_running()

@@ -1,4 +1,4 @@
-"""Loads from the cache what nodes run compiled; so has the server from which they are forked."""
+"""Imports and makes what nodes need; so has the server from which they are forked."""
 
 from __future__ import annotations
 
@@ -9,9 +9,7 @@ from maglev_hw_bridge.stage import BridgeStage
 from maglev_model.parameters import build
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.timeline import Timeline
-from maglev_study.closed_loop import warm_up
 
-warm_up()
 Supervisor(ControllerParameters())
 Timeline(ReferenceParameters())
 _stage = BridgeStage.ready(build(BridgeParameters, {'homing.at_start': True}))

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import contextlib
+import functools
+import importlib
 import os
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
+from maglev_model import ahead
 from maglev_model.sources import sources_digest
 
 
@@ -25,10 +28,17 @@ def _absent(name: str) -> Iterator[None]:
         del sys.modules[name]
 
 
-with _absent('coverage'):  # a tenth of a second, for what only a coverage run could want
-    import numba
-
 Function = TypeVar('Function', bound=Callable[..., Any])
+
+
+@functools.cache
+def numba() -> Any:
+    """Numba, imported when it is first needed: a node may do without, see :mod:`ahead`."""
+    with _absent('coverage'):  # a tenth of a second, for what only a coverage run could want
+        module = importlib.import_module('numba')
+    _cache_by_sources(module)
+    ahead.teach_numba()
+    return module
 
 
 def compiled(function: Function) -> Function:
@@ -37,7 +47,7 @@ def compiled(function: Function) -> Function:
     Arithmetic stays IEEE in the order written (no fast-math), so that runs repeat bit by bit; a
     division by zero gives infinity or NaN, as in NumPy, which costs no test of each divisor.
     """
-    return cast(Function, numba.njit(cache=True, error_model='numpy', _nrt=True)(function))
+    return _compiled(function, _nrt=True)
 
 
 def borrowing(function: Function) -> Function:
@@ -47,11 +57,22 @@ def borrowing(function: Function) -> Function:
     into a slice of another, both of which Numba refuses, and must not return one it was given. It
     becomes part of what calls it: else each call would copy the constants of the machine.
     """
-    decorated = numba.njit(cache=True, error_model='numpy', _nrt=False, forceinline=True)
-    return cast(Function, decorated(function))
+    return _compiled(function, _nrt=False, forceinline=True)
 
 
-def _cache_by_sources() -> None:
+def _compiled(function: Function, **options: bool) -> Function:
+    def make() -> Any:
+        return numba().njit(cache=True, error_model='numpy', **options)(function)
+
+    return cast(Function, ahead.stand_in(function, make))
+
+
+def intrinsic(function: Callable[..., Any]) -> Any:
+    """Numba's decorator of that name."""
+    return ahead.stand_in(function, lambda: numba().extending.intrinsic(function))
+
+
+def _cache_by_sources(module: Any) -> None:
     """Give each state of the sources a cache of its own, unless NUMBA_CACHE_DIR names one.
 
     Numba notices a change of a function's own file but not of the functions it calls in others, and
@@ -60,7 +81,4 @@ def _cache_by_sources() -> None:
     if 'NUMBA_CACHE_DIR' in os.environ:
         return
     home = Path(os.environ.get('XDG_CACHE_HOME') or Path.home() / '.cache')
-    numba.config.CACHE_DIR = str(home / 'maglev-stage' / sources_digest())
-
-
-_cache_by_sources()
+    module.config.CACHE_DIR = str(home / 'maglev-stage' / sources_digest())

@@ -18,6 +18,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
+from maglev_model import ahead
 from maglev_model.command import leave_with
 from maglev_model.parameters import ParameterError
 from maglev_node.dds import prepare_middleware
@@ -101,12 +102,14 @@ def main(name: str, *nodes: str | type[MaglevNode[Any]], background: bool = Fals
     graph already. With ``--help`` or ``-h`` it only says what they are. Nodes in the background
     yield to those of the loop when they want the same core. Several are for what only watches:
     those of the loop take their real-time priority, and land, each in a process of its own.
-    Leaves without the interpreter's own teardown, which may block in the middleware.
+    What is compiled it has ready, where set-up made it. Leaves without the interpreter's own
+    teardown, which may block in the middleware.
     """
     if {'-h', '--help'} & set(sys.argv[1:]):
         leave_with(lambda: _help(name, [_load(node) for node in nodes]))
     if background:
         os.nice(_BACKGROUND_NICENESS)
+    ahead.use()
     try:
         code = run(name, *(partial(_make, node) for node in nodes))
     except Exception:

@@ -19,11 +19,7 @@ import functools
 from collections.abc import Callable
 from typing import Any
 
-import numba
-from numba import carray, types
-from numba.core.cgutils import ir
-from numba.extending import intrinsic
-
+from maglev_model.compiled import intrinsic, numba
 from maglev_model.parameters import ParameterError
 from maglev_model.plugins import find_plugin
 
@@ -32,11 +28,14 @@ _kept: dict[str, Any] = {}
 """Compiled models, which must live as long as their addresses are called."""
 
 
-def _caller(result: Any, *arguments: Any) -> Any:
+def _caller(result: str, *names: str) -> Any:
     """An intrinsic that calls what lies at an address; a ``uintp`` argument is a pointer."""
+    types, ir = numba().types, numba().core.cgutils.ir
+    back = ir.VoidType() if result == 'void' else ir.DoubleType()
+    arguments = [getattr(types, name) for name in names]
 
     def build(typing_context: Any, address: Any, *given: Any) -> Any:
-        signature = result(types.int64, *arguments)
+        signature = getattr(types, result)(types.int64, *arguments)
 
         def generate(context: Any, builder: Any, _signature: Any, values: Any) -> Any:
             where, *rest = values
@@ -46,10 +45,9 @@ def _caller(result: Any, *arguments: Any) -> Any:
                 else value
                 for kind, value in zip(arguments, rest, strict=True)
             ]
-            back = ir.VoidType() if result == types.void else ir.DoubleType()
             function = ir.FunctionType(back, [value.type for value in native])
             called = builder.call(builder.inttoptr(where, function.as_pointer()), native)
-            return context.get_dummy_value() if result == types.void else called
+            return context.get_dummy_value() if result == 'void' else called
 
         return signature, generate
 
@@ -59,21 +57,21 @@ def _caller(result: Any, *arguments: Any) -> Any:
 @intrinsic
 def call_friction(context, address, velocity, level, step, memory):  # type: ignore[no-untyped-def]
     """``force(velocity, level, step, memory)`` at ``address``."""
-    build = _caller(types.float64, types.float64, types.float64, types.float64, types.uintp)
+    build = _caller('float64', 'float64', 'float64', 'float64', 'uintp')
     return build(context, address, velocity, level, step, memory)
 
 
 @intrinsic
 def call_motor(context, address, gap, i_d, i_q, out):  # type: ignore[no-untyped-def]
     """``forces(gap, i_d, i_q, out)`` at ``address``."""
-    build = _caller(types.void, types.float64, types.float64, types.float64, types.uintp)
+    build = _caller('void', 'float64', 'float64', 'float64', 'uintp')
     return build(context, address, gap, i_d, i_q, out)
 
 
 @intrinsic
 def call_sensor(context, address, length, channel, sample, memory):  # type: ignore[no-untyped-def]
     """``reading(length, channel, sample, memory)`` at ``address``."""
-    build = _caller(types.float64, types.float64, types.int64, types.int64, types.uintp)
+    build = _caller('float64', 'float64', 'int64', 'int64', 'uintp')
     return build(context, address, length, channel, sample, memory)
 
 
@@ -81,7 +79,9 @@ def friction_address(name: str) -> int:
     """Address of the ``force`` of a module; raises ParameterError."""
 
     def made(force: Any) -> Any:
-        @numba.cfunc('float64(float64, float64, float64, CPointer(float64))')
+        carray = numba().carray
+
+        @numba().cfunc('float64(float64, float64, float64, CPointer(float64))')
         def call(velocity, level, step, memory):  # type: ignore[no-untyped-def]
             return force(velocity, level, step, carray(memory, _MEMORY))
 
@@ -94,7 +94,9 @@ def motor_address(name: str) -> int:
     """Address of the ``forces`` of a module; raises ParameterError."""
 
     def made(forces: Any) -> Any:
-        @numba.cfunc('void(float64, float64, float64, CPointer(float64))')
+        carray = numba().carray
+
+        @numba().cfunc('void(float64, float64, float64, CPointer(float64))')
         def call(gap, i_d, i_q, out):  # type: ignore[no-untyped-def]
             forces(gap, i_d, i_q, carray(out, 2))
 
@@ -107,7 +109,9 @@ def sensor_address(name: str) -> int:
     """Address of the ``reading`` of a module; raises ParameterError."""
 
     def made(reading: Any) -> Any:
-        @numba.cfunc('float64(float64, int64, int64, CPointer(float64))')
+        carray = numba().carray
+
+        @numba().cfunc('float64(float64, int64, int64, CPointer(float64))')
         def call(length, channel, sample, memory):  # type: ignore[no-untyped-def]
             return reading(length, channel, sample, carray(memory, _MEMORY))
 
@@ -120,8 +124,8 @@ def sensor_address(name: str) -> int:
 def _address(parameter: str, name: str, function: str, make: Callable[[Any], Any]) -> int:
     module = find_plugin(parameter, name, (function,))
     try:
-        compiled = make(numba.njit(getattr(module, function)))
-    except numba.core.errors.NumbaError as error:
+        compiled = make(numba().njit(getattr(module, function)))
+    except numba().core.errors.NumbaError as error:
         reason = str(error).strip().splitlines()[-1]
         raise ParameterError(
             f"parameter '{parameter}' is '{name}', whose '{function}' cannot be compiled: {reason}"
