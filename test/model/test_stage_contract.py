@@ -13,7 +13,7 @@ from maglev_controller.regulator import Regulator
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.stage import BridgeStage
 from maglev_model.parameters import build
-from maglev_model.stage import EncoderSample, Stage, StageError
+from maglev_model.stage import EncoderSample, Stage, StageError, motor_currents
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
 
@@ -133,6 +133,14 @@ def test_lists_and_integers_are_currents_too(stage: Stage) -> None:
     stage.read()
     stage.write([0, 0, 0, 0], np.zeros(4, dtype=np.float32))  # type: ignore[arg-type]
     rest(stage.read())
+
+
+def test_currents_are_contiguous_and_the_same_array_where_that_is() -> None:
+    """What takes them reads four numbers one behind the other, whatever the strides."""
+    table = np.arange(8.0).reshape(4, 2)
+    assert motor_currents('i_d', table[:, 1]).strides == (8,)
+    assert motor_currents('i_d', table[:, 1]).tolist() == [1.0, 3.0, 5.0, 7.0]
+    assert motor_currents('i_d', ZERO) is ZERO
 
 
 def test_without_fresh_currents_the_last_stay_for_a_while(stage: Stage) -> None:

@@ -152,7 +152,7 @@ def motor_currents(name: str, value: Any) -> FloatArray:
     Raises ValueError, with ``name`` in it, for what is not four numbers.
     """
     if type(value) is np.ndarray and value.dtype == np.float64 and value.shape == (4,):
-        return value
+        return value if value.flags.c_contiguous else value.copy()
     try:
         array = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError) as error:
