@@ -51,10 +51,11 @@ def call_stage() -> None:
 
 
 HALVES: dict[str, Callable[[], None]] = {'answer': call_answer, 'stage': call_stage}
+"""What is done by one process each."""
 
 
 def main() -> None:
-    """Compile a half; raises what goes wrong, of the file after all else was compiled."""
+    """Compile a half: the file last, so that Numba's cache is full also where that goes wrong."""
     half = sys.argv[1]
     build_ahead.record()
     HALVES[half]()

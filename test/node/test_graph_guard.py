@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import time
+from collections.abc import Iterator
+from contextlib import ExitStack
+from itertools import count
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,16 +16,33 @@ import pytest
 from maglev_node import graph_guard
 from maglev_node.graph_guard import GraphGuard
 from maglev_node.node import NodeError
+from maglev_node.place import Place
 
+machines, at_end = count(1000), ExitStack()
 OTHER = SimpleNamespace(node_namespace='/', node_name='other')
+HOLDING = """
+from maglev_node.place import Place
+place = Place()
+print(place.take('here'), flush=True)
+input()
+"""
+
+
+@pytest.fixture(autouse=True)
+def _all_end() -> Iterator[None]:
+    yield
+    at_end.close()
 
 
 class Node:
-    """Discovers others since long ago, and publishes what it claims."""
+    """Discovers others since long ago, and publishes what it claims; alone on its machine."""
 
     steady_clock = None
 
-    def __init__(self) -> None:
+    def __init__(self, machine: int | None = None) -> None:
+        domain = next(machines) if machine is None else machine
+        self.context = SimpleNamespace(get_domain_id=lambda: domain)
+        self.at_end = at_end.enter_context(ExitStack())
         self.discovering_since = time.monotonic() - 60.0  # it took that long to load
         self.publishers: list[Any] = []
         self.failed: list[str] = []
@@ -90,3 +112,52 @@ def test_what_flies_stays_and_the_newcomer_leaves() -> None:
     flies = False
     first.look()
     assert 'another stage' in first.failed[0]
+
+
+def test_on_one_machine_the_second_is_refused_though_nothing_is_discovered(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(graph_guard, '_PROBATION', 0.1)
+    first: Any = Node(7)
+    GraphGuard(first).claim('stage/measurement', 'stage')
+    with pytest.raises(NodeError, match='by a process on this machine: there is another stage'):
+        GraphGuard(Node(7)).claim('stage/measurement', 'stage')  # type: ignore[arg-type]
+    GraphGuard(Node(8)).claim('stage/measurement', 'stage')  # type: ignore[arg-type]
+    GraphGuard(Node(7)).claim('other/measurement', 'stage')  # type: ignore[arg-type]
+    first.at_end.close()
+    GraphGuard(Node(7)).claim('stage/measurement', 'stage')  # type: ignore[arg-type]
+
+
+def test_a_released_claim_is_anothers_to_make(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As of a stage that is cleaned up."""
+    monkeypatch.setattr(graph_guard, '_PROBATION', 0.1)
+    guard, other = GraphGuard(Node(9)), GraphGuard(Node(9))  # type: ignore[arg-type]
+    guard.claim('stage/measurement', 'stage')
+    guard.claim('stage/measurement', 'stage')
+    guard.release()
+    other.claim('stage/measurement', 'stage')
+    with pytest.raises(NodeError):
+        guard.claim('stage/measurement', 'stage')
+
+
+def test_who_takes_a_place_is_waited_for_and_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    guard, late = GraphGuard(Node(10)), Node(10)  # type: ignore[arg-type]
+    guard.claim('stage/currents', 'controller')
+    looks = iter([[], [], [OTHER]])
+    monkeypatch.setattr(late, 'get_publishers_info_by_topic', lambda _topic: next(looks))
+    with pytest.raises(NodeError, match="is already published by '/other'"):
+        GraphGuard(late).claim('stage/currents', 'controller')  # type: ignore[arg-type]
+
+
+def test_a_place_is_free_when_its_process_is_killed() -> None:
+    command = [sys.executable, '-c', HOLDING]
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as other:
+        assert other.stdout is not None
+        assert other.stdout.readline() == 'True\n'
+        place = Place()
+        assert not place.take('here')
+        other.kill()
+    assert place.take('here')
+    place.leave()

@@ -1,8 +1,6 @@
 """Compile ahead what a process called, for :mod:`maglev_model.ahead`; needs Numba and a C compiler.
 
-build_ahead.record()
-...  # import and call what nodes call
-build_ahead.build('maglev_ahead', folder, build_ahead.called())
+After :func:`record`, import and call what nodes call; then :func:`build` what was :func:`called`.
 """
 
 from __future__ import annotations

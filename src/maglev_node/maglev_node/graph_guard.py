@@ -12,6 +12,7 @@ from rclpy.timer import Timer
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from maglev_node.node import MaglevNode, NodeError
+from maglev_node.place import Place
 
 DISCOVERY_TIME = 1.0
 """How long a node looks for others of its kind before it takes its place on the graph [s]."""
@@ -20,6 +21,7 @@ _PROBATION = 5.0
 """How long it goes on looking from when it has, and is the one to leave [s]."""
 
 _LOOK_PERIOD = 0.25  # [s]
+_PAUSE = 0.02  # between two looks of who waits [s]
 _MATCHING = 0.1  # at most, from when the graph shows a subscription to when it gets messages [s]
 _REMINDER = 5.0  # between two lines about who is waited for [s]
 
@@ -27,9 +29,10 @@ _REMINDER = 5.0  # between two lines about who is waited for [s]
 class GraphGuard:
     """Keeps a node the only publisher of the topic it claims.
 
-    On a busy machine discovery can take longer than :data:`DISCOVERY_TIME`, and two may claim it at
-    once, so the node goes on looking for some seconds, and leaves when it finds another then; but
-    not while it flies the platen, for the other one, which does not, finds it as well.
+    On this machine by a :class:`~maglev_node.place.Place`. Discovery, which tells of other machines
+    and of strangers, can take longer than :data:`DISCOVERY_TIME`, and two may claim it at once, so
+    the node goes on looking for some seconds, and leaves when it finds another then; but not while
+    it flies the platen, for the other one, which does not, finds it as well.
 
     :param flying: whether it does.
     """
@@ -39,6 +42,8 @@ class GraphGuard:
         self._topic = self._kind = ''
         self._claimed = -math.inf  # when [s, monotonic]
         self._timer: Timer | None = None
+        self._place = Place()
+        node.at_end.callback(self.release)
 
     def claim(self, topic: str, kind: str) -> None:
         """Be the only publisher of a topic: raise NodeError when another node publishes it.
@@ -47,10 +52,8 @@ class GraphGuard:
         since it began. ``kind`` names the node in messages.
         """
         while time.monotonic() - self._node.discovering_since < DISCOVERY_TIME:
-            time.sleep(0.02)
-        publishers = self._node.get_publishers_info_by_topic(topic)
-        if publishers:
-            raise NodeError(self._taken(topic, kind, publishers[0]))
+            time.sleep(_PAUSE)
+        self._take_place(topic, kind)
         self._topic, self._kind = topic, kind
         self._claimed = time.monotonic()
         if self._timer is not None:
@@ -59,6 +62,24 @@ class GraphGuard:
             self._timer = self._node.create_timer(
                 _LOOK_PERIOD, self._look_again, clock=self._node.steady_clock
             )
+
+    def _take_place(self, topic: str, kind: str) -> None:
+        """Where it is taken, wait for discovery to tell by whom, or for that one to end."""
+        name = f'{self._node.context.get_domain_id()} {self._node.resolve_topic_name(topic)}'
+        until = time.monotonic() + _PROBATION
+        while True:
+            publishers = self._node.get_publishers_info_by_topic(topic)
+            if publishers:
+                raise NodeError(self._taken(topic, kind, publishers[0]))
+            if self._place.take(name):
+                return
+            if time.monotonic() > until:
+                raise NodeError(self._taken(topic, kind))
+            time.sleep(_PAUSE)
+
+    def release(self) -> None:
+        """Let another process on this machine claim it."""
+        self._place.leave()
 
     def alone(self) -> bool:
         """Whether what was claimed still has one publisher; otherwise the node ends."""
@@ -77,10 +98,12 @@ class GraphGuard:
         if self._timer is not None and not self.on_probation():
             self._timer.cancel()
 
-    def _taken(self, topic: str, kind: str, who: TopicEndpointInfo) -> str:
-        name = f'{who.node_namespace.rstrip("/")}/{who.node_name}'
+    def _taken(self, topic: str, kind: str, who: TopicEndpointInfo | None = None) -> str:
+        whom = 'a process on this machine'
+        if who is not None:
+            whom = f"'{who.node_namespace.rstrip('/')}/{who.node_name}'"
         return (
-            f"{self._node.resolve_topic_name(topic)} is already published by '{name}': there is"
+            f'{self._node.resolve_topic_name(topic)} is already published by {whom}: there is'
             f' another {kind} on this graph; stop it, or use another namespace or ROS_DOMAIN_ID'
         )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar
 
@@ -77,6 +78,8 @@ class MaglevNode(PollingNode, Generic[P]):
 
     def __init__(self, name: str, parameter_table: type[P], **node_options: Any) -> None:
         super().__init__(name, **node_options)
+        self.at_end = ExitStack()
+        """What is closed with the node, after its publishers and all."""
         self.parameters: P = ros_parameters.declare(self, name, parameter_table)
         self.add_on_set_parameters_callback(self._on_set_parameters)
         self.steady_clock = Clock(clock_type=ClockType.STEADY_TIME)
@@ -121,6 +124,11 @@ class MaglevNode(PollingNode, Generic[P]):
 
     def close(self) -> None:
         """What must happen last; publishers still work. Must be quick and must not raise."""
+
+    def destroy_node(self) -> None:
+        """Leave the graph, and close what is to be closed then."""
+        super().destroy_node()
+        self.at_end.close()
 
     def rescue(self) -> None:
         """What cannot wait until :meth:`close` when a callback has raised; must not raise."""

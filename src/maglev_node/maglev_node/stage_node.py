@@ -93,6 +93,7 @@ class StageNode(ManagedNode[P], Generic[P, S]):
             stage.configure()
         except Exception:
             stage.close()
+            self._graph.release()
             raise
         self._sampling = Sampling(self, stage)
 
@@ -112,6 +113,7 @@ class StageNode(ManagedNode[P], Generic[P, S]):
         if self._sampling is not None:
             self._sampling.close()
             self._sampling = None
+            self._graph.release()
 
     def may_stop(self) -> bool:
         """Land before the process ends."""
