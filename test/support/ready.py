@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-sys.path.append(str(Path(__file__).parents[2] / 'setup'))
+sys.path.append(str(Path(__file__).resolve().parents[2] / 'setup'))
 from compile_ahead import HALVES
 
 for call in HALVES.values():
