@@ -78,6 +78,7 @@ def test_peers_that_are_given_stay_in_effect() -> None:
     os.environ[RANGE], os.environ[PEERS] = 'LOCALHOST', '192.0.2.1'
     prepare_middleware()
     assert os.environ[RANGE] == 'LOCALHOST'
+    assert not only_here()
     assert os.environ[PROFILES] == str(dds._ANYWHERE)
 
 

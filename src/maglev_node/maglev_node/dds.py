@@ -27,7 +27,7 @@ def prepare_middleware() -> None:
     os.environ.setdefault(_TRANSPORTS, 'UDPv4')
     if os.environ.get(_PROFILES, '') not in ('', str(_ANYWHERE), str(_HERE)):
         return
-    here = only_here() and not os.environ.get(_PEERS)
+    here = only_here()
     os.environ[_PROFILES] = str(_HERE if here else _ANYWHERE)
     if here:
         # With LOCALHOST rmw_fastrtps adds shared memory whatever is asked for; the profile keeps to
@@ -39,7 +39,7 @@ def only_here() -> bool:
     """Whether nodes of this process, or of one that it starts, see those of this machine alone."""
     where = os.environ.get(_RANGE)
     by_profile = where == _BY_PROFILE and os.environ.get(_PROFILES) == str(_HERE)
-    return where == 'LOCALHOST' or by_profile
+    return by_profile or (where == 'LOCALHOST' and not os.environ.get(_PEERS))
 
 
 def local_participants(domain: int) -> int:

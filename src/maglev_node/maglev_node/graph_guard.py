@@ -11,11 +11,12 @@ from rclpy.node import Node
 from rclpy.timer import Timer
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from maglev_node import dds
 from maglev_node.node import MaglevNode, NodeError
 from maglev_node.place import Place
 
 DISCOVERY_TIME = 1.0
-"""How long a node looks for others of its kind before it takes its place on the graph [s]."""
+"""How long a node looks for others of its kind on other machines before it takes its place [s]."""
 
 _PROBATION = 5.0
 """How long it goes on looking from when it has, and is the one to leave [s]."""
@@ -29,10 +30,10 @@ _REMINDER = 5.0  # between two lines about who is waited for [s]
 class GraphGuard:
     """Keeps a node the only publisher of the topic it claims.
 
-    On this machine by a :class:`~maglev_node.place.Place`. Discovery, which tells of other machines
-    and of strangers, can take longer than :data:`DISCOVERY_TIME`, and two may claim it at once, so
-    the node goes on looking for some seconds, and leaves when it finds another then; but not while
-    it flies the platen, for the other one, which does not, finds it as well.
+    On this machine by a :class:`~maglev_node.place.Place`, at once. Of other machines, and of
+    strangers, discovery tells. It can take longer than :data:`DISCOVERY_TIME`, and two may claim it
+    at once, so the node goes on looking for some seconds, and leaves when it finds another then;
+    but not while it flies the platen, for the other one, which does not, finds it as well.
 
     :param flying: whether it does.
     """
@@ -48,10 +49,13 @@ class GraphGuard:
     def claim(self, topic: str, kind: str) -> None:
         """Be the only publisher of a topic: raise NodeError when another node publishes it.
 
-        Called before the publisher is made; waits until discovery has had :data:`DISCOVERY_TIME`
-        since it began. ``kind`` names the node in messages.
+        Called before the publisher is made. Where other machines may be on the graph, waits until
+        discovery has had :data:`DISCOVERY_TIME` since it began. ``kind`` names the node in
+        messages.
         """
-        while time.monotonic() - self._node.discovering_since < DISCOVERY_TIME:
+        while (
+            time.monotonic() - self._node.discovering_since < DISCOVERY_TIME and not dds.only_here()
+        ):
             time.sleep(_PAUSE)
         self._take_place(topic, kind)
         self._topic, self._kind = topic, kind
