@@ -20,6 +20,7 @@ enum { WENT_WELL, MET_A_LIMIT };
 static const double pi = 3.14159265358979323846, reserve = 1.1, creep = 1e-5, rest = 0.1;
 
 static double square(double x) { return x * x; }
+static double tanh_(double x) { return 1.0 - 2.0 / (1.0 + exp(2.0 * x)); }
 static double within(double x, double limit) { return fmin(fmax(x, -limit), limit); }
 
 // -- the machine
@@ -42,6 +43,18 @@ static struct force force_coefficients(Machine *m, double gap) {
   };
 }
 
+static struct force tabulated(const struct effects_motors_forces *table, Machine *m, double gap) {
+  double place = (gap - table->first) * table->per_metre, k[4];
+  if (!(place >= 0.0 && place < sizeof table->row / sizeof *table->row))
+    return force_coefficients(m, gap);
+  int number = place;
+  double u = place - number - 0.5;
+  for (int n = 0; n < 4; n++) k[n] = table->row[number][5][n];
+  for (int power = 4; power >= 0; power--)
+    for (int n = 0; n < 4; n++) k[n] = k[n] * u + table->row[number][power][n];
+  return (struct force){k[0], k[1], k[2], k[3]};
+}
+
 static void gaps_of(Machine *m, double y, double phi, double theta, double gap[4]) {
   double tilt_phi = m->r * sin(phi), tilt_theta = m->r * sin(theta);
   gap[0] = y - tilt_phi, gap[1] = y + tilt_theta, gap[2] = y + tilt_phi, gap[3] = y - tilt_theta;
@@ -53,7 +66,7 @@ static void derivative(const Stage *s, Machine *m, const double *x, const double
   double gap[4], v[4], h[4];
   gaps_of(m, x[0], x[6], x[8], gap);
   for (int k = 0; k < 4; k++) {
-    struct force f = force_coefficients(m, gap[k]);
+    struct force f = tabulated(&s->effects.motors.forces, m, gap[k]);
     v[k] = -f.k_1 + f.k_2 * i[k] - f.k_3 * (i[k] * i[k] + i[4 + k] * i[4 + k]);
     h[k] = -f.k_h * i[4 + k];
   }
@@ -69,7 +82,7 @@ static void derivative(const Stage *s, Machine *m, const double *x, const double
     double speed = x[2 * a + 1];
     rate[2 * a] = speed;
     rate[2 * a + 1] =
-      moved[a] - s->viscous[a] * speed - s->coulomb[a] * tanh(speed / s->coulomb_velocity[a]);
+      moved[a] - s->viscous[a] * speed - s->coulomb[a] * tanh_(speed / s->coulomb_velocity[a]);
   }
 }
 
@@ -97,10 +110,15 @@ static int phase(Stage *s, int number, double current) {
 
 static int amplifiers(Stage *s, Machine *m) {
   int met = 0;
+  double c[2], n[2];
+  for (int first = 0; first < 2; first++) {
+    double angle = pi * s->state[first ? 2 : 4] / m->tau;
+    c[first] = cos(angle), n[first] = sin(angle);
+  }
   for (int k = 0; k < 4; k++) {
-    double angle = pi * s->state[k % 2 ? 2 : 4] / m->tau, c = cos(angle), n = sin(angle);
     double i_d = s->command[k], i_q = s->command[4 + k];
-    double alpha = s->dq_scale * (i_d * c - i_q * n), beta = s->dq_scale * (i_d * n + i_q * c);
+    double alpha = s->dq_scale * (i_d * c[k % 2] - i_q * n[k % 2]);
+    double beta = s->dq_scale * (i_d * n[k % 2] + i_q * c[k % 2]);
     met |= phase(s, 3 * k, alpha);
     met |= phase(s, 3 * k + 1, -0.5 * alpha + 0.5 * sqrt(3.0) * beta);
     met |= phase(s, 3 * k + 2, -0.5 * alpha - 0.5 * sqrt(3.0) * beta);
@@ -199,7 +217,7 @@ static void virtual_input(
   p->error[k] = measured - position;
   p->error_rate[k] = a->estimated_velocity - velocity;
   double w = c->error_gain[k] * a->error + c->rate_gain[k] * p->error_rate[k];
-  if (velocity != 0.0) {
+  if (velocity != 0.0 && a->bristle != copysign(1.0, velocity)) {
     double turned = -expm1(-fabs(velocity) * c->period / c->friction_way[k]);
     a->bristle += turned * (copysign(1.0, velocity) - a->bristle);
   }

@@ -128,6 +128,7 @@ SAMPLE: Final = np.dtype(
         ('realised', 'f8', 5),  # accelerations that the currents give
         ('asked', 'f8', 8),  # currents, i_d of motors 1..4, then i_q [A]
         ('excess', 'f8', 2),  # sat(u) - u of u_x and u_z [A]
+        ('work', 'f8', (5, 4)),  # the inverse's own
     ],
     align=True,
 )

@@ -23,9 +23,10 @@ def friction_ahead(settings: Record, axis: Record, index: int) -> float:
     if settings.friction_gain == 0.0:
         return 0.0
     velocity = axis.smooth_velocity
-    if velocity != 0.0:
+    direction = math.copysign(1.0, velocity)
+    if velocity != 0.0 and axis.bristle != direction:
         turned = -math.expm1(-abs(velocity) * settings.period / settings.friction_way[index])
-        axis.bristle += turned * (math.copysign(1.0, velocity) - axis.bristle)
+        axis.bristle += turned * (direction - axis.bristle)
     return float(axis.friction * axis.bristle)
 
 

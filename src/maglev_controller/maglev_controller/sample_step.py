@@ -33,7 +33,7 @@ from maglev_model.inverse import (
     Answer,
     CurrentLimits,
     clip,
-    exact_inverse,
+    exact_inverse_with,
     simplified_inverse,
 )
 from maglev_model.machine import Machine
@@ -189,7 +189,10 @@ def _currents(
     controlled, wanted = settings.controlled, sample.virtual_input
     answer = Answer(direct, quadrature, sample.realised, sample.excess)
     if settings.inverse == EXACT:
-        return exact_inverse(machine, limits, controlled, sample.position, wanted, answer)
+        position = sample.position
+        return exact_inverse_with(
+            sample.work, machine, limits, controlled, position, wanted, answer
+        )
     if settings.inverse == SIMPLIFIED:
         return simplified_inverse(machine, limits, controlled, sample.position, wanted, answer)
     return equilibrium_inverse(machine, limits, controlled, settings.equilibrium, wanted, answer)

@@ -213,23 +213,23 @@ def exact_inverse(
     than half, and what that cannot serve limits u_x and u_z. Of a machine with a single motor it is
     that motor that (2) is solved for.
     """
-    if machine.motors == 1.0:
-        return _single_motor_inverse(machine, limits, controlled, output, wanted, answer)
     work = np.empty((5, 4))
-    return _four_motor_inverse(machine, limits, controlled, output, wanted, answer, work)
+    return exact_inverse_with(work, machine, limits, controlled, output, wanted, answer)
 
 
 @borrowing
-def _four_motor_inverse(
+def exact_inverse_with(
+    work: FloatArray,
     machine: Machine,
     limits: CurrentLimits,
     controlled: FloatArray,
     output: FloatArray,
     wanted: FloatArray,
     answer: Answer,
-    work: FloatArray,
 ) -> int:
     """As :func:`exact_inverse`, with room (5, 4) to work in."""
+    if machine.motors == 1.0:
+        return _single_motor_inverse(machine, limits, controlled, output, wanted, answer)
     direct, quadrature, realised, excess = answer
     gap, a, b, h, attraction = work[0], work[1], work[2], work[3], work[4]
     gaps_from_outputs(machine, output, gap)

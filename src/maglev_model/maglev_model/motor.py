@@ -115,6 +115,15 @@ def force_coefficients(machine: Machine, gap: float) -> tuple[float, float, floa
 
 
 @borrowing
+def forces_of_currents(
+    coefficients: tuple[float, float, float, float], i_d: float, i_q: float
+) -> tuple[float, float]:
+    """F_V and F_H [N], (1), (2), of ``i_d``, ``i_q`` [A] and the :func:`force_coefficients`."""
+    k_1, k_2, k_3, k_h = coefficients
+    return -k_1 + k_2 * i_d - k_3 * (i_d * i_d + i_q * i_q), -k_h * i_q
+
+
+@borrowing
 def attraction_coefficients(machine: Machine, gap: float) -> tuple[float, float, float]:
     """``a = √(K_v1·L_v1)`` [√N], ``b = √(K_v3·L_v3)`` [√N/A] and ``K_h·L_h`` [N/A] at one gap [m].
 

@@ -12,7 +12,7 @@ import math
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import borrowing
 from maglev_model.machine import Machine
-from maglev_model.motor import force_coefficients
+from maglev_model.motor import force_coefficients, forces_of_currents
 
 
 @borrowing
@@ -52,8 +52,43 @@ def outputs_from_gaps(
 @borrowing
 def _motor_forces(machine: Machine, gap: float, i_d: float, i_q: float) -> tuple[float, float]:
     """F_V and F_H of one motor [N], (1), (2)."""
-    k_1, k_2, k_3, k_h = force_coefficients(machine, gap)
-    return -k_1 + k_2 * i_d - k_3 * (i_d * i_d + i_q * i_q), -k_h * i_q
+    return forces_of_currents(force_coefficients(machine, gap), i_d, i_q)
+
+
+@borrowing
+def motor_gaps(
+    machine: Machine, y: float, phi: float, theta: float
+) -> tuple[float, float, float, float]:
+    """Air gaps of the motors [m] by (5); of a single motor, ``y`` is its own."""
+    tilt_phi = machine.r * math.sin(phi)
+    tilt_theta = machine.r * math.sin(theta) if machine.motors != 1.0 else 0.0
+    return y - tilt_phi, y + tilt_theta, y + tilt_phi, y - tilt_theta
+
+
+@borrowing
+def balance(
+    machine: Machine,
+    phi: float,
+    theta: float,
+    vertical: tuple[float, float, float, float],
+    horizontal: tuple[float, float, float, float],
+) -> tuple[float, float, float, float, float]:
+    """Accelerations of y, x, z, phi, theta [m/s², rad/s²] by (6), (7), from the motors' forces [N].
+
+    Of a machine with a single motor, which is motor 2, only y and x move.
+    """
+    v_1, v_2, v_3, v_4 = vertical
+    h_1, h_2, h_3, h_4 = horizontal
+    if machine.motors == 1.0:
+        return machine.G + v_2 / machine.M_y, h_2 / machine.M_x, 0.0, 0.0, 0.0
+    lever = machine.k_rot / machine.M_y
+    return (
+        machine.G + (v_1 + v_2 + v_3 + v_4) / machine.M_y,
+        (h_2 + h_4) / machine.M_x,
+        (h_1 + h_3) / machine.M_z,
+        lever * (v_3 - v_1) - machine.k_s_phi * phi,
+        lever * (v_2 - v_4) - machine.k_s_theta * theta,
+    )
 
 
 @borrowing
@@ -70,23 +105,12 @@ def output_accelerations(
     ``y`` [m], ``phi``, ``theta`` [rad]; ``i_d``, ``i_q`` [A], shape (4,). Of a machine with a
     single motor, only y and x move.
     """
-    tilt_phi = machine.r * math.sin(phi)
-    tilt_theta = machine.r * math.sin(theta)
-    if machine.motors == 1.0:
-        v_2, h_2 = _motor_forces(machine, y, i_d[1], i_q[1])
-        return machine.G + v_2 / machine.M_y, h_2 / machine.M_x, 0.0, 0.0, 0.0
-    v_1, h_1 = _motor_forces(machine, y - tilt_phi, i_d[0], i_q[0])
-    v_2, h_2 = _motor_forces(machine, y + tilt_theta, i_d[1], i_q[1])
-    v_3, h_3 = _motor_forces(machine, y + tilt_phi, i_d[2], i_q[2])
-    v_4, h_4 = _motor_forces(machine, y - tilt_theta, i_d[3], i_q[3])
-    lever = machine.k_rot / machine.M_y
-    return (
-        machine.G + (v_1 + v_2 + v_3 + v_4) / machine.M_y,
-        (h_2 + h_4) / machine.M_x,
-        (h_1 + h_3) / machine.M_z,
-        lever * (v_3 - v_1) - machine.k_s_phi * phi,
-        lever * (v_2 - v_4) - machine.k_s_theta * theta,
-    )
+    g_1, g_2, g_3, g_4 = motor_gaps(machine, y, phi, theta)
+    v_1, h_1 = _motor_forces(machine, g_1, i_d[0], i_q[0])
+    v_2, h_2 = _motor_forces(machine, g_2, i_d[1], i_q[1])
+    v_3, h_3 = _motor_forces(machine, g_3, i_d[2], i_q[2])
+    v_4, h_4 = _motor_forces(machine, g_4, i_d[3], i_q[3])
+    return balance(machine, phi, theta, (v_1, v_2, v_3, v_4), (h_1, h_2, h_3, h_4))
 
 
 @borrowing

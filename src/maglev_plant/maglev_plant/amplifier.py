@@ -37,15 +37,15 @@ def limit_phase(stage: StageArrays, phase: int, current: float) -> float:
 def set_targets(stage: StageArrays, machine: Machine) -> None:
     """Write what the amplifiers aim at for one sample, from the commanded currents."""
     scale = stage.dq_scale
-    for motor in range(4):
-        displacement = stage.state[4] if motor % 2 == 0 else stage.state[2]
-        angle = electrical_angle(machine, displacement)
-        wanted_d, wanted_q = stage.command[motor], stage.command[4 + motor]
-        want_a, want_b, want_c = phase_currents(wanted_d, wanted_q, angle, scale)
-        a = limit_phase(stage, 3 * motor, want_a)
-        b = limit_phase(stage, 3 * motor + 1, want_b)
-        c = limit_phase(stage, 3 * motor + 2, want_c)
-        if a != want_a or b != want_b or c != want_c:
-            wanted_d, wanted_q = direct_quadrature_currents(a, b, c, angle, scale)
-        stage.target[motor] = wanted_d
-        stage.target[4 + motor] = wanted_q
+    for first in range(2):  # opposite motors have one angle
+        angle = electrical_angle(machine, stage.state[2] if first else stage.state[4])
+        for motor in range(first, 4, 2):
+            wanted_d, wanted_q = stage.command[motor], stage.command[4 + motor]
+            want_a, want_b, want_c = phase_currents(wanted_d, wanted_q, angle, scale)
+            a = limit_phase(stage, 3 * motor, want_a)
+            b = limit_phase(stage, 3 * motor + 1, want_b)
+            c = limit_phase(stage, 3 * motor + 2, want_c)
+            if a != want_a or b != want_b or c != want_c:
+                wanted_d, wanted_q = direct_quadrature_currents(a, b, c, angle, scale)
+            stage.target[motor] = wanted_d
+            stage.target[4 + motor] = wanted_q

@@ -18,8 +18,8 @@ import numpy as np
 
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import borrowing
+from maglev_model.force_table import ForceTable, force_table, tabulated_coefficients
 from maglev_model.machine import Machine
-from maglev_model.motor import force_coefficients
 from maglev_model.records import Record
 from maglev_plant.effects.foreign import call_motor, motor_address
 from maglev_plant.random_numbers import drawn
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 class MotorArrays(Record):
     """The four motors; of a machine with one, motor 2 in the middle."""
 
+    forces: ForceTable  # of one as its machine says
     first: int  # motors first to last - 1
     last: int
     place: Annotated[FloatArray, 4, 2]  # X, Z [m]
@@ -74,6 +75,7 @@ def motor_arrays(parameters: PlantParameters, machine: Machine) -> MotorArrays:
     x_max, z_max = parameters.machine.x_max, parameters.machine.z_max
     along, across = np.array([z_max, x_max] * 2), np.array([x_max, z_max] * 2)
     return MotorArrays(
+        forces=force_table(parameters.machine, machine),
         first=1 if single else 0,
         last=2 if single else 4,
         place=motor_places(parameters),
@@ -121,7 +123,7 @@ def motor_coefficients(
     machine: Machine, motors: MotorArrays, motor: int, gap: float, along: float
 ) -> tuple[float, float, float, float]:
     """k_1, k_2, k_3, k_h of ``force_coefficients`` for one of the motors."""
-    k_1, k_2, k_3, k_h = force_coefficients(machine, gap)
+    k_1, k_2, k_3, k_h = tabulated_coefficients(motors.forces, machine, gap)
     m, w = motors.magnet[motor] * motors.warm_magnet, motors.winding[motor]
     return m * m * k_1, m * w * k_2, w * w * k_3, m * w * thrust_factor(motors, along) * k_h
 
