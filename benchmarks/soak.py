@@ -1,15 +1,16 @@
 #!/usr/bin/env python3
 """The ellipse in real time behind the emulated bridge for half an hour, on a machine that works.
 
-    python benchmarks/soak.py [--minutes M] [--stage hw_bridge|plant] [--out DIR]
+    python benchmarks/soak.py [--minutes M] [--stage hw_bridge|plant] [--idle] [--out DIR]
 
-Beside it: a busy process for each core, one that fills and frees 400 MB over and over, two
-strangers on every topic of the stage, and 20 MB a second of somebody else's messages. Prints
-memory of each node at the beginning and the end, how it and the open files grew, late samples and
-errors, and beside them how late the machine itself was: what keeps a thread of the highest priority
-waiting, no node can do without. Where the kernel grants real-time threads a part of each processor
-only, it takes the rest in one piece, 50 ms of a second by default. Errors are held to 1 mm and 1
-mrad only. Exits with 1 when the run did not pass, lost a message, or a node grew.
+Beside it, unless ``--idle``: a busy process for each core, one that fills and frees 400 MB over and
+over, two strangers on every topic of the stage, and 20 MB a second of somebody else's messages.
+Prints memory of each node at the beginning and the end, how it and the open files grew, late
+samples and errors, and beside them how late the machine itself was: what keeps a bare thread of the
+highest priority waiting, no node can do without. Where the kernel grants real-time threads a part
+of each processor only, it takes the rest in one piece, 50 ms of a second by default. Errors are
+held to 1 mm and 1 mrad only. Exits with 1 when the run did not pass, lost a message, or a node
+grew.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 sys.path.insert(0, str(Path(__file__).parents[1] / 'test' / 'support'))
-from witness import Witness
+from witness import SHORT, Witness
 
 ROOT = Path(__file__).resolve().parents[1]
 SUPPORT = ROOT / 'test' / 'support'
@@ -92,8 +93,11 @@ def nodes(scenario: int) -> dict[str, int]:
 
 
 @contextlib.contextmanager
-def load() -> Iterator[None]:
-    """Others at work."""
+def load(*, idle: bool) -> Iterator[None]:
+    """Others at work, unless the machine is to be idle."""
+    if idle:
+        yield
+        return
     scripts = [BUSY] * len(os.sched_getaffinity(0)) + [FILLING, TALKING]
     commands = [[sys.executable, '-c', script] for script in scripts]
     commands += [[sys.executable, str(SUPPORT / 'stranger.py')]] * 2
@@ -106,14 +110,14 @@ def load() -> Iterator[None]:
             process.wait()
 
 
-def fly(minutes: float, stage: str, out: Path, limits: Path) -> dict[str, list[Look]]:
+def fly(asked: argparse.Namespace, out: Path, limits: Path) -> dict[str, list[Look]]:
     """The scenario, and what its nodes held all along."""
     limits.write_text(LIMITS, encoding='utf-8')
-    command = [str(ROOT / 'scenarios' / 'ellipse.sh'), '--stage', stage, '--mode', 'realtime']
-    command += ['--duration', str(60.0 * minutes), '--params', str(limits), '--quiet']
-    command += ['--out', str(out)]
+    command = [str(ROOT / 'scenarios' / 'ellipse.sh'), '--mode', 'realtime']
+    command += ['--stage', asked.stage, '--duration', str(60.0 * asked.minutes)]
+    command += ['--params', str(limits), '--quiet', '--out', str(out)]
     held: dict[str, list[Look]] = {}
-    with load():
+    with load(idle=asked.idle):
         scenario = subprocess.Popen(command, start_new_session=True)
         while scenario.poll() is None:
             for name, pid in nodes(scenario.pid).items():
@@ -158,17 +162,29 @@ def wrong_with(held: dict[str, list[Look]], metrics: dict[str, Any], hours: floa
     return wrong
 
 
+def lateness(metrics: dict[str, Any], witness: Witness) -> str:
+    """Of the samples, and of the machine."""
+    late = metrics['timing']['late_samples'] / metrics['run_samples']
+    ratio = f'{late / witness.share:.1f} times that' if witness.share else 'none was'
+    return (
+        f'{late:.4%} of the samples were late; a bare thread of the highest priority was late by'
+        f' more than {1e3 * SHORT} ms in {witness.share:.4%} of its looks, {ratio}, and by'
+        f' {1e3 * witness.worst:.1f} ms at most'
+    )
+
+
 def main() -> int:
     """Fly, look and tell."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('--minutes', type=float, default=30.0)
     parser.add_argument('--stage', choices=('hw_bridge', 'plant'), default='hw_bridge')
+    parser.add_argument('--idle', action='store_true', help='nothing else at work')
     parser.add_argument('--out', type=Path, help='where the run is left; forgotten otherwise')
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         out = asked.out or Path(folder) / 'run'
         with Witness() as witness:
-            held = fly(asked.minutes, asked.stage, out, Path(folder) / 'limits.yaml')
+            held = fly(asked, out, Path(folder) / 'limits.yaml')
         try:
             metrics = json.loads((out / 'metrics.json').read_text(encoding='utf-8'))
         except FileNotFoundError:
@@ -181,7 +197,7 @@ def main() -> int:
             f'{max(one.memory for one in looks):.1f}; settled it grew by {memory:+.1f} MB and '
             f'{files:+d} files; {looks[-1].threads} threads'
         )
-    print(f'the machine kept a thread of the highest priority waiting for {witness.worst:.4f} s')
+    print(lateness(metrics, witness))
     print(f'the kernel grants real-time threads {granted()}')
     print('timing', json.dumps(metrics['timing']), 'missing', metrics['missing_samples'])
     print('errors', json.dumps(metrics['own_axes']))

@@ -6,6 +6,7 @@ in real time is lost then, whatever the software does.
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -16,14 +17,18 @@ from typing import Self
 from maglev_node.realtime import take_priority
 
 TOLERATED = 0.004  # by which a thread may be late on a machine that keeps time [s]
+SHORT = 0.0005  # by which it may be late without a sample of 1 ms being so [s]
 _PERIOD = 0.002
 
 
 class Witness:
-    """Watches from entry to exit; ``worst`` is by how much a thread was late [s]."""
+    """Watches from entry to exit.
+
+    ``worst`` is by how much a thread was late [s], ``share`` how often by more than :data:`SHORT`.
+    """
 
     def __init__(self) -> None:
-        self.worst = 0.0
+        self.worst = self.share = 0.0
 
     def __enter__(self) -> Self:
         self._process = subprocess.Popen(
@@ -34,7 +39,7 @@ class Witness:
 
     def __exit__(self, *_: object) -> None:
         said, _ = self._process.communicate()  # the end of its input ends it
-        self.worst = float(said)
+        self.worst, self.share = json.loads(said)
 
     @property
     def disturbed(self) -> bool:
@@ -44,20 +49,24 @@ class Witness:
 
 def _main() -> None:
     take_priority(98)
-    late = dict.fromkeys(os.sched_getaffinity(0), 0.0)
+    processors = os.sched_getaffinity(0)
+    worst, looks, late = (dict.fromkeys(processors, 0.0) for _ in range(3))
 
     def watch(processor: int) -> None:
         os.sched_setaffinity(0, {processor})
         while True:
             due = time.monotonic() + _PERIOD
             time.sleep(_PERIOD)
-            late[processor] = max(late[processor], time.monotonic() - due)
+            by = time.monotonic() - due
+            worst[processor] = max(worst[processor], by)
+            looks[processor] += 1.0
+            late[processor] += by > SHORT
 
-    for processor in late:
+    for processor in processors:
         threading.Thread(target=watch, args=(processor,), daemon=True).start()
     print('watching', flush=True)
     sys.stdin.read()
-    print(max(late.values()))
+    print(json.dumps([max(worst.values()), sum(late.values()) / max(sum(looks.values()), 1.0)]))
 
 
 if __name__ == '__main__':
