@@ -13,6 +13,8 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from maglev_model import ahead
 from maglev_model.compiled import numba
 
@@ -23,12 +25,27 @@ class Recorder(ahead.StandIn):
     def __init__(self, function: Callable[..., Any], make: Callable[[], Any]) -> None:
         super().__init__(function, make)
         self.called_with: set[tuple[Any, ...]] = set()
+        self._known: set[Any] = set()
         _recorders.append(self)
 
     def __call__(self, *arguments: Any) -> Any:
         """Call it, compiled."""
-        self.called_with.add(tuple(numba().typeof(one) for one in arguments))
+        kind = _kind(arguments)
+        if kind not in self._known:  # Numba's type of a record takes its time
+            self._known.add(kind)
+            self.called_with.add(tuple(numba().typeof(one) for one in arguments))
         return self.real(*arguments)
+
+
+def _kind(argument: Any) -> Any:
+    """What Numba's type of an argument depends on."""
+    if isinstance(argument, tuple):
+        return type(argument), tuple(_kind(one) for one in argument)
+    if isinstance(argument, np.ndarray):
+        flags = argument.flags
+        layout = flags.c_contiguous, flags.f_contiguous, flags.aligned, flags.writeable
+        return argument.dtype, argument.ndim, layout
+    return type(argument)
 
 
 Calls = Mapping[Recorder, frozenset[tuple[Any, ...]]]
