@@ -128,6 +128,18 @@ def test_on_one_machine_the_second_is_refused_though_nothing_is_discovered(
     GraphGuard(Node(7)).claim('stage/measurement', 'stage')  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize(('here', 'waited'), [(True, False), (False, True)])
+def test_discovery_is_waited_for_where_there_may_be_other_machines(
+    monkeypatch: pytest.MonkeyPatch, *, here: bool, waited: bool
+) -> None:
+    monkeypatch.setattr(graph_guard, 'DISCOVERY_TIME', 0.5)
+    monkeypatch.setattr(graph_guard.dds, 'only_here', lambda: here)
+    node: Any = Node()
+    node.discovering_since = time.monotonic()
+    GraphGuard(node).claim('stage/measurement', 'stage')
+    assert (time.monotonic() - node.discovering_since >= 0.5) == waited
+
+
 def test_a_released_claim_is_anothers_to_make(monkeypatch: pytest.MonkeyPatch) -> None:
     """As of a stage that is cleaned up."""
     monkeypatch.setattr(graph_guard, '_PROBATION', 0.1)

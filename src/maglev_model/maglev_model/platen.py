@@ -16,17 +16,22 @@ from maglev_model.motor import force_coefficients, forces_of_currents
 
 
 @borrowing
+def motor_gaps(
+    machine: Machine, y: float, phi: float, theta: float
+) -> tuple[float, float, float, float]:
+    """Air gaps of the motors [m] by (5); of a single motor, ``y`` is its own."""
+    tilt_phi = machine.r * math.sin(phi)
+    tilt_theta = machine.r * math.sin(theta) if machine.motors != 1.0 else 0.0
+    return y - tilt_phi, y + tilt_theta, y + tilt_phi, y - tilt_theta
+
+
+@borrowing
 def gaps_from_outputs(machine: Machine, output: FloatArray, gap: FloatArray) -> None:
     """Air gaps of the motors by (5).
 
     ``output`` y, x, z, phi, theta [m, rad], shape (5,); ``gap`` [m], shape (4,), is written.
     """
-    tilt_phi = machine.r * math.sin(output[3])
-    tilt_theta = machine.r * math.sin(output[4])
-    gap[0] = output[0] - tilt_phi
-    gap[1] = output[0] + tilt_theta
-    gap[2] = output[0] + tilt_phi
-    gap[3] = output[0] - tilt_theta
+    gap[0], gap[1], gap[2], gap[3] = motor_gaps(machine, output[0], output[3], output[4])
 
 
 @borrowing
@@ -53,16 +58,6 @@ def outputs_from_gaps(
 def _motor_forces(machine: Machine, gap: float, i_d: float, i_q: float) -> tuple[float, float]:
     """F_V and F_H of one motor [N], (1), (2)."""
     return forces_of_currents(force_coefficients(machine, gap), i_d, i_q)
-
-
-@borrowing
-def motor_gaps(
-    machine: Machine, y: float, phi: float, theta: float
-) -> tuple[float, float, float, float]:
-    """Air gaps of the motors [m] by (5); of a single motor, ``y`` is its own."""
-    tilt_phi = machine.r * math.sin(phi)
-    tilt_theta = machine.r * math.sin(theta) if machine.motors != 1.0 else 0.0
-    return y - tilt_phi, y + tilt_theta, y + tilt_phi, y - tilt_theta
 
 
 @borrowing

@@ -53,9 +53,8 @@ class GraphGuard:
         discovery has had :data:`DISCOVERY_TIME` since it began. ``kind`` names the node in
         messages.
         """
-        while (
-            time.monotonic() - self._node.discovering_since < DISCOVERY_TIME and not dds.only_here()
-        ):
+        known = self._node.discovering_since + (0.0 if dds.only_here() else DISCOVERY_TIME)
+        while time.monotonic() < known:
             time.sleep(_PAUSE)
         self._take_place(topic, kind)
         self._topic, self._kind = topic, kind

@@ -20,6 +20,7 @@ from maglev_model.axes import FloatArray
 from maglev_model.compiled import borrowing
 from maglev_model.force_table import ForceTable, force_table, tabulated_coefficients
 from maglev_model.machine import Machine
+from maglev_model.motor import forces_of_currents
 from maglev_model.records import Record
 from maglev_plant.effects.foreign import call_motor, motor_address
 from maglev_plant.random_numbers import drawn
@@ -145,9 +146,8 @@ def add_motor_forces(
             call_motor(motors.address, gap, i_d, i_q, motors.out.ctypes.data)
             down, push = motors.out[0], motors.out[1]
         else:
-            k_1, k_2, k_3, k_h = motor_coefficients(machine, motors, motor, gap, along)
-            down = -k_1 + k_2 * i_d - k_3 * (i_d * i_d + i_q * i_q)
-            push = -k_h * i_q
+            coefficients = motor_coefficients(machine, motors, motor, gap, along)
+            down, push = forces_of_currents(coefficients, i_d, i_q)
         if motors.cogging > 0.0:
             wave = motors.cogging_wave
             size = motors.cogging * math.exp(-wave * (gap - motors.cogging_gap))
