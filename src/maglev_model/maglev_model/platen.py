@@ -141,12 +141,11 @@ def affine_terms(
     a: 1, v_phi, v_y, v_phi·v_y, v_phi², v_y², v_theta, v_y·v_theta, v_theta²;
     b: 1, v_phi, v_y, v_phi·v_y, v_phi², v_y²; c: 1, v_theta, v_y, v_y·v_theta, v_theta², v_y².
     """
-    tilt_phi = machine.r * math.sin(phi)
-    tilt_theta = machine.r * math.sin(theta)
-    p_1, q_1, s_1, _ = force_coefficients(machine, y - tilt_phi)
-    p_2, q_2, s_2, _ = force_coefficients(machine, y + tilt_theta)
-    p_3, q_3, s_3, _ = force_coefficients(machine, y + tilt_phi)
-    p_4, q_4, s_4, _ = force_coefficients(machine, y - tilt_theta)
+    g_1, g_2, g_3, g_4 = motor_gaps(machine, y, phi, theta)
+    p_1, q_1, s_1, _ = force_coefficients(machine, g_1)
+    p_2, q_2, s_2, _ = force_coefficients(machine, g_2)
+    p_3, q_3, s_3, _ = force_coefficients(machine, g_3)
+    p_4, q_4, s_4, _ = force_coefficients(machine, g_4)
     per_mass = 1.0 / machine.M_y
     lever = machine.k_rot / machine.M_y
     u_x2 = u_x * u_x

@@ -12,6 +12,7 @@ import numpy as np
 from maglev_model.compiled import borrowing, compiled
 from maglev_model.machine import Machine
 from maglev_model.machine_array import machine_from_array
+from maglev_model.platen import motor_gaps
 from maglev_model.records import Block
 from maglev_plant.arrays import StageArrays
 from maglev_plant.effects.modes import add_deflections
@@ -59,13 +60,8 @@ def encode(block: Block) -> None:
         _encode_rough(stage, machine)
         return
     state, reading = stage.state, stage.reading
-    y = state[0]
-    tilt_phi = machine.r * math.sin(state[6])
-    tilt_theta = machine.r * math.sin(state[8])
-    reading[0] = y - tilt_phi
-    reading[1] = y + tilt_theta
-    reading[2] = y + tilt_phi
-    reading[3] = y - tilt_theta
+    gaps = motor_gaps(machine, state[0], state[6], state[8])
+    reading[0], reading[1], reading[2], reading[3] = gaps
     reading[4], reading[5] = state[2], state[4]
     for i in range(6):
         stage.effects.sensor.own[i] = reading[i]
