@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import signal
+import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,6 +25,8 @@ from graph import Nodes, Observer, Process
 
 from maglev_msgs.msg import ControllerState, Measurement, Reference
 from maglev_node.topics import CONTROLLER_STATE, MEASUREMENT, REFERENCE, reference_qos, sample_qos
+
+STRANGER = Path(__file__).resolve().parents[1] / 'support' / 'stranger.py'
 
 
 def errors_on_time(observer: Observer, first: int) -> np.ndarray:
@@ -149,10 +153,20 @@ def test_what_a_second_stage_repeats_does_not_stop_the_flight(
     assert 'began anew' not in graph['controller'].output
 
 
+def page_faults(graph: dict[str, Process]) -> np.ndarray:
+    """How many each of them has had."""
+    stats = [Path(f'/proc/{process.pid}/stat').read_text() for process in graph.values()]
+    return np.array([int(stat.rpartition(')')[2].split()[7]) for stat in stats])
+
+
 @pytest.mark.alone
 @pytest.mark.real_time
 def test_real_time_also_when_a_process_was_stopped(nodes: Nodes, watching: Observer) -> None:
+    """One of the graph's own for a while; and for all of the flight somebody else's subscriber."""
+    stranger = nodes.run('stranger', [sys.executable, str(STRANGER)])
     graph = fly(nodes, LONG, mode='realtime')
+    stranger.wait_for(f'hears {CONTROLLER_STATE}')
+    stranger.signal(signal.SIGSTOP)
     watching.wait(lambda: watching.newest(REFERENCE) is not None)
     watching.wait(lambda: watching.newest(REFERENCE).phase == Reference.TRACK)
     first = watching.newest(MEASUREMENT)
@@ -174,6 +188,10 @@ def test_real_time_also_when_a_process_was_stopped(nodes: Nodes, watching: Obser
         assert watching.newest(CONTROLLER_STATE).mode == ControllerState.REGULATING
         assert watching.newest(MEASUREMENT).late_samples >= before.late_samples + 10
         assert 'currents cut' not in graph['plant'].output
+
+    faults = page_faults(graph)
+    samples(watching, 1000)
+    assert np.max(page_faults(graph) - faults) < 2000  # two a sample
 
 
 def retune(graph: dict[str, Process], watching: Observer, bound: float) -> None:

@@ -5,8 +5,11 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+
+UNHEARD = Path(__file__).resolve().parents[1] / 'support' / 'unheard.py'
 
 CODE = """
 import re, resource, os
@@ -77,6 +80,18 @@ def test_what_spins_without_end_ends_not_the_machine(deaf: bool, ends: signal.Si
 def test_what_is_permitted_is_taken() -> None:
     done = subprocess.run([sys.executable, '-c', CODE], check=False, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(('mode', 'heap'), [('realtime', 'as_it_is'), ('lockstep', 'kept')])
+def test_a_reader_that_is_stopped_costs_no_new_memory_with_every_sample(
+    mode: str, heap: str
+) -> None:
+    """The middleware makes a longer copy, each time, of what that has not acknowledged."""
+    done = subprocess.run(
+        [sys.executable, str(UNHEARD), mode, heap], check=True, capture_output=True, text=True
+    )
+    faults = [float(line) for line in done.stdout.splitlines()]
+    assert max(faults) < 1.0  # with neither 50 and more
 
 
 def test_under_a_limit_memory_is_left_alone() -> None:

@@ -15,7 +15,7 @@ from maglev_model.stage import EncoderSample, Fault, StageError, Truth
 from maglev_msgs.msg import Currents, Measurement, PlantState
 from maglev_node.sampling import Sampling
 from maglev_node.stamp import set_stamp
-from maglev_node.topics import MEASUREMENT, TRUE_STATE
+from maglev_node.topics import KEPT, MEASUREMENT, TRUE_STATE
 
 ZERO = np.zeros(4)
 
@@ -165,6 +165,12 @@ def test_in_real_time_the_stage_is_no_clock() -> None:
     node.tick()
     assert not node.topics[Measurement].newest.lockstep
     assert Clock not in node.topics
+
+
+@pytest.mark.parametrize('mode', KEPT)
+def test_what_is_kept_for_readers_is_bounded_by_the_mode(mode: str) -> None:
+    _, node = start(MadeUpStage(truth=True), mode=mode)
+    assert node.depths == {KEPT[mode]}
 
 
 def test_the_truth_goes_out_beside_the_measurement() -> None:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from types import SimpleNamespace
 from typing import Any
 
+from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
 from rosgraph_msgs.msg import Clock
 
@@ -70,6 +71,7 @@ class MadeUpNode:
     def __init__(self, **parameters: Any) -> None:
         self.parameters = ClockedStageParameters(**parameters)
         self.topics: dict[type, Topic] = {}
+        self.depths: set[int] = set()  # of its publishers
         self.errors: list[str] = []
         self.failed: list[str] = []
         self.timers: list[Any] = []
@@ -84,7 +86,8 @@ class MadeUpNode:
         names = self.subscribers.get(topic, [])
         return [SimpleNamespace(node_name=name, node_namespace='/') for name in names]
 
-    def create_publisher(self, message_type: type, _topic: str, _qos: Any) -> Topic:
+    def create_publisher(self, message_type: type, _topic: str, qos: QoSProfile) -> Topic:
+        self.depths.add(qos.depth)
         return self.topics.setdefault(message_type, Topic(message_type))
 
     def create_subscription(

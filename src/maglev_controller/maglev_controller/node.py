@@ -24,10 +24,12 @@ from maglev_node.samples import SampleQueue, SampleWriter, hear
 from maglev_node.topics import (
     CONTROLLER_STATE,
     CURRENTS,
+    KEPT,
     MEASUREMENT,
     REFERENCE,
     SAMPLE_TOPICS,
     reference_qos,
+    sample_qos,
 )
 
 _REFERENCE_PERIOD = 2e-3  # between two looks at what references have arrived [s]
@@ -91,9 +93,10 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         self._logged = (self.supervisor.mode, self.supervisor.reason)
         self._session = secrets.randbits(64) | 1
         GraphGuard(self, lambda: self.supervisor.flying).claim(CURRENTS, 'controller')
-        self._currents = SampleWriter(self, CURRENTS)
+        qos = sample_qos(KEPT[self.parameters.mode])
+        self._currents = SampleWriter(self, CURRENTS, qos)
         self._currents['session'] = self._session
-        self._state = SampleWriter(self, CONTROLLER_STATE)
+        self._state = SampleWriter(self, CONTROLLER_STATE, qos)
         self._watchers = Watchers(self, self.parameters.watchers)
         self._references = SampleQueue(self, REFERENCE, reference_qos())
         self._measurements = hear(self, MEASUREMENT, self._on_measurement)

@@ -134,14 +134,17 @@ class MaglevNode(PollingNode, Generic[P]):
         """What cannot wait until :meth:`close` when a callback has raised; must not raise."""
 
     def take_realtime_priority(self) -> None:
-        """In real time, take SCHED_FIFO for all threads and lock the memory, where permitted.
+        """In real time, keep the heap, and take SCHED_FIFO and lock memory, where permitted.
 
         For nodes with :class:`SourceParameters`, when all is built that takes long, which would
         keep others from the processor, and when publishers and subscriptions exist, so that the
         middleware's threads do too. What is not permitted is said once.
         """
         parameters: Any = self.parameters
-        if parameters.mode != 'realtime' or parameters.realtime_priority == 0:
+        if parameters.mode != 'realtime':
+            return
+        realtime.keep_heap()
+        if parameters.realtime_priority == 0:
             return
         refused = []
         if not realtime.take_priority(parameters.realtime_priority):

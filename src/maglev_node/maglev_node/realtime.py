@@ -17,6 +17,7 @@ _LONGEST_BURST = 5_000_000, 10_000_000
 [us]."""
 
 _CURRENT, _FUTURE, _ON_FAULT = 1, 2, 4  # mlockall(2)
+_TRIM_THRESHOLD, _MMAP_MAX = -1, -4  # mallopt(3)
 
 
 def take_priority(priority: int) -> bool:
@@ -59,6 +60,17 @@ def _spins(thread: Path) -> bool:
         return (thread / 'comm').read_text(encoding='utf-8').startswith(_SPINNING)
     except OSError:  # it has ended
         return False
+
+
+def keep_heap() -> None:
+    """Let large blocks come from the heap and stay in it: no page is asked for again and again.
+
+    By itself glibc maps a block of 128 kB and more anew each time, page fault after page fault.
+    """
+    libc = ctypes.CDLL(None)
+    if hasattr(libc, 'mallopt'):  # of glibc, not of every C library
+        libc.mallopt(_MMAP_MAX, 0)
+        libc.mallopt(_TRIM_THRESHOLD, -1)
 
 
 def lock_memory() -> bool:

@@ -12,7 +12,7 @@ from maglev_node.graph_guard import Watchers
 from maglev_node.node import MaglevNode, SourceParameters
 from maglev_node.samples import SampleWriter
 from maglev_node.stamp import set_stamp
-from maglev_node.topics import CLOCK, MEASUREMENT, TRUE_STATE, sample_qos
+from maglev_node.topics import CLOCK, KEPT, MEASUREMENT, TRUE_STATE, sample_qos
 
 _CLOCK_SAMPLES = 10
 """Samples from one message on ``clock`` to the next."""
@@ -32,18 +32,19 @@ class SamplePublisher:
         self._period = round(1e9 * sample_time)  # [ns]
         self._first: tuple[int, int] | None = None  # sample, and its time [ns]
         lockstep = node.parameters.mode == 'lockstep'
-        self._measurement = SampleWriter(node, MEASUREMENT)
+        qos = sample_qos(KEPT[node.parameters.mode])
+        self._measurement = SampleWriter(node, MEASUREMENT, qos)
         self._measurement['lockstep'] = lockstep
         self._topics = [MEASUREMENT]
         self._watchers = Watchers(node, node.parameters.watchers)
         self._true_state: SampleWriter | None = None
         if truth:
             self._topics.append(TRUE_STATE)
-            self._true_state = SampleWriter(node, TRUE_STATE)
+            self._true_state = SampleWriter(node, TRUE_STATE, qos)
         self._clock = Clock()
         self._clock_publisher: Any = None
         if lockstep:
-            self._clock_publisher = node.create_publisher(Clock, CLOCK, sample_qos())
+            self._clock_publisher = node.create_publisher(Clock, CLOCK, qos)
 
     def start(self) -> None:
         """Let stage time begin with what is published next."""

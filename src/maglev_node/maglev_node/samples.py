@@ -20,9 +20,9 @@ _FRAME = 'stage'
 class SampleWriter:
     """Publishes a sample topic; what is not written before is as in the message before."""
 
-    def __init__(self, node: Node, topic: str, qos: QoSProfile | None = None) -> None:
+    def __init__(self, node: Node, topic: str, qos: QoSProfile) -> None:
         self._message = Outgoing(KEYS[topic], _FRAME)
-        self.publisher = node.create_publisher(SAMPLE_TOPICS[topic], topic, qos or sample_qos())
+        self.publisher = node.create_publisher(SAMPLE_TOPICS[topic], topic, qos)
 
     def __setitem__(self, field: str, value: ArrayLike) -> None:
         """Write a field. Raises KeyError for none of the message's, ValueError for the shape."""

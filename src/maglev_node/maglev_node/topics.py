@@ -34,10 +34,18 @@ KEYS = {
 """Their keys in :data:`maglev_model.wire.TOPIC_TYPES`."""
 
 
-def sample_qos(depth: int = 16384) -> QoSProfile:
+KEPT = {'lockstep': 16384, 'realtime': 2048}
+"""Samples that a publisher keeps for readers that are busy, by mode.
+
+Each is a second or more. A reader that has gone without a word, or was stopped, acknowledges none
+of them, and the more there are, the longer takes a publish, whose time in real time is short.
+"""
+
+
+def sample_qos(depth: int = KEPT['lockstep']) -> QoSProfile:
     """Reliable, in order, nothing kept for late joiners: no sample may be lost or come twice.
 
-    ``depth`` samples, several seconds of lockstep, are kept for a reader that is busy.
+    ``depth`` samples are kept for a reader that is busy.
     """
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
@@ -47,7 +55,7 @@ def sample_qos(depth: int = 16384) -> QoSProfile:
     )
 
 
-def reference_qos(depth: int = 16384) -> QoSProfile:
+def reference_qos(depth: int = KEPT['lockstep']) -> QoSProfile:
     """As :func:`sample_qos`, but the last ``depth`` samples are kept for a controller to come.
 
     The reference may see the controller before that sees the reference.

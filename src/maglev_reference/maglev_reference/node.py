@@ -25,6 +25,7 @@ from maglev_node.node import MaglevNode, SourceParameters
 from maglev_node.samples import SampleQueue, SampleWriter
 from maglev_node.topics import (
     CONTROLLER_STATE,
+    KEPT,
     MEASUREMENT,
     REFERENCE,
     reference_qos,
@@ -104,7 +105,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         self._run = ReferenceRun(self.parameters, self.parameters.lead, self.parameters.autostart)
         self._watchers = Watchers(self, self.parameters.watchers)
         self._seen = self._reminded = self._looked = time.monotonic()
-        self._message = SampleWriter(self, REFERENCE, reference_qos())
+        self._message = SampleWriter(self, REFERENCE, reference_qos(KEPT[self.parameters.mode]))
         self._message['session'] = secrets.randbits(64) | 1
         self._measurements = SampleQueue(self, MEASUREMENT, sample_qos(1))
         self._states = SampleQueue(self, CONTROLLER_STATE, sample_qos(1))

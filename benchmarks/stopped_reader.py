@@ -1,0 +1,82 @@
+"""What a reader that is stopped, or gone without a word, costs the writer with every sample.
+
+Such a reader acknowledges nothing, and Fast DDS keeps a list of what each reader has still to
+acknowledge, which it makes longer by one at a time: by a copy of all of it. Publishes 1,000
+measurements a second to a subscriber that is stopped (SIGSTOP), at each depth of the writer's
+history, with the heap as glibc has it and kept (:func:`maglev_node.realtime.keep_heap`), and prints
+the median time of a publish [us] second by second. ``stopped_reader.py [SECONDS]``
+"""
+
+from __future__ import annotations
+
+import itertools
+import signal
+import statistics
+import subprocess
+import sys
+import time
+
+import rclpy
+
+from maglev_model.wire import Outgoing
+from maglev_msgs.msg import Measurement
+from maglev_node.dds import prepare_middleware
+from maglev_node.realtime import keep_heap
+from maglev_node.topics import KEPT, KEYS, MEASUREMENT, sample_qos
+
+
+def subscribe() -> None:
+    """Be the subscriber."""
+    rclpy.init()
+    node = rclpy.create_node('reader')
+    node.create_subscription(Measurement, MEASUREMENT, lambda _: None, sample_qos(), raw=True)
+    rclpy.spin(node)
+
+
+def publish(depth: int, seconds: int) -> None:
+    """Print what a publish takes, a second after the other."""
+    reader = subprocess.Popen([sys.executable, __file__, 'subscribe'])
+    rclpy.init()
+    node = rclpy.create_node('writer')
+    publisher = node.create_publisher(Measurement, MEASUREMENT, sample_qos(depth))
+    message = Outgoing(KEYS[MEASUREMENT], 'stage')
+    try:
+        while not publisher.get_subscription_count():
+            time.sleep(0.1)
+        reader.send_signal(signal.SIGSTOP)
+        found, due = [], time.perf_counter()
+        for _ in range(seconds):
+            took = []
+            for _ in range(1000):
+                due += 1e-3
+                time.sleep(max(due - time.perf_counter(), 0.0))
+                begun = time.perf_counter()
+                publisher.publish(message.serialized())
+                took.append(time.perf_counter() - begun)
+            found.append(1e6 * statistics.median(took))
+    finally:
+        reader.kill()
+        reader.wait()
+    print(' '.join(f'{each:5.0f}' for each in found), flush=True)
+
+
+def main() -> None:
+    """All of them, or one."""
+    prepare_middleware()
+    match sys.argv[1:]:
+        case ['subscribe']:
+            subscribe()
+        case ['publish', depth, heap, seconds]:
+            if heap == 'kept':
+                keep_heap()
+            publish(int(depth), int(seconds))
+        case given:
+            seconds = given[0] if given else '18'
+            for depth, heap in itertools.product(sorted(set(KEPT.values())), ('as it is', 'kept')):
+                print(f'{depth:6d} samples, heap {heap:9s}', end='', flush=True)
+                command = [sys.executable, __file__, 'publish', str(depth), heap, seconds]
+                subprocess.run(command, check=True)
+
+
+if __name__ == '__main__':
+    main()
