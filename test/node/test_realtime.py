@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from maglev_node.topics import KEPT
+
 UNHEARD = Path(__file__).resolve().parents[1] / 'support' / 'unheard.py'
 
 CODE = """
@@ -82,16 +84,13 @@ def test_what_is_permitted_is_taken() -> None:
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize(('mode', 'heap'), [('realtime', 'as_it_is'), ('lockstep', 'kept')])
-def test_a_reader_that_is_stopped_costs_no_new_memory_with_every_sample(
-    mode: str, heap: str
-) -> None:
+@pytest.mark.parametrize('mode', KEPT)
+def test_a_reader_that_is_stopped_costs_no_new_memory_with_every_sample(mode: str) -> None:
     """The middleware makes a longer copy, each time, of what that has not acknowledged."""
-    done = subprocess.run(
-        [sys.executable, str(UNHEARD), mode, heap], check=True, capture_output=True, text=True
-    )
+    command = [sys.executable, str(UNHEARD), mode, 'kept']
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
     faults = [float(line) for line in done.stdout.splitlines()]
-    assert max(faults) < 1.0  # with neither 50 and more
+    assert max(faults) < 1.0  # in lockstep 50 and more, with the heap as glibc has it
 
 
 def test_under_a_limit_memory_is_left_alone() -> None:

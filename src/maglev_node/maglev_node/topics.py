@@ -34,11 +34,11 @@ KEYS = {
 """Their keys in :data:`maglev_model.wire.TOPIC_TYPES`."""
 
 
-KEPT = {'lockstep': 16384, 'realtime': 2048}
+KEPT = {'lockstep': 16384, 'realtime': 4096}
 """Samples that a publisher keeps for readers that are busy, by mode.
 
-Each is a second or more. A reader that has gone without a word, or was stopped, acknowledges none
-of them, and the more there are, the longer takes a publish, whose time in real time is short.
+Seconds in both. A reader that has gone without a word, or was stopped, acknowledges none of them,
+and the more there are, the longer takes a publish, whose time in real time is short.
 """
 
 
