@@ -175,15 +175,26 @@ def test_into_the_flight_of_another_controller_none_speaks(
     assert controller.output.count('silent') == 1
 
 
+def designing(controller: Process) -> list[int]:
+    """Processes in which it designs."""
+    tasks = Path(f'/proc/{controller.pid}/task').glob('*/children')
+    children = [int(child) for task in tasks for child in task.read_text().split()]
+    return [
+        child for child in children if 'design' in Path(f'/proc/{child}/cmdline').read_text('utf-8')
+    ]
+
+
 def test_during_a_redesign_the_emergency_stop_is_served(nodes: Nodes, watching: Observer) -> None:
-    fly(nodes, watching)
+    controller = fly(nodes, watching)['controller']
     client = watching.node.create_client(Trigger, '/controller/emergency_stop')
     watching.make_heard(client)
     changing = watching.begin_to_set('controller', y__bandwidth=180.0)
-    watching.serve(0.3)
-    assert not changing.done()
+    watching.wait(lambda: bool(designing(controller)))
+    (design,) = designing(controller)
+    os.kill(design, signal.SIGSTOP)
     watching.ask(client, Trigger.Request())
     assert not changing.done()
+    os.kill(design, signal.SIGCONT)
     watching.wait(lambda: watching.newest(CONTROLLER_STATE).mode == ControllerState.LANDING)
     landed_softly(watching)
     assert watching.answer(changing).result is not None
