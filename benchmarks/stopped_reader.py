@@ -10,41 +10,25 @@ the median time of a publish [us] second by second. ``stopped_reader.py [SECONDS
 from __future__ import annotations
 
 import itertools
-import signal
 import statistics
 import subprocess
 import sys
 import time
+from pathlib import Path
 
-import rclpy
+sys.path.insert(0, str(Path(__file__).parents[1] / 'test' / 'support'))
+from unheard import unheard
 
 from maglev_model.wire import Outgoing
-from maglev_msgs.msg import Measurement
-from maglev_node.dds import prepare_middleware
 from maglev_node.realtime import keep_heap
-from maglev_node.topics import KEPT, KEYS, MEASUREMENT, sample_qos
-
-
-def subscribe() -> None:
-    """Be the subscriber."""
-    rclpy.init()
-    node = rclpy.create_node('reader')
-    node.create_subscription(Measurement, MEASUREMENT, lambda _: None, sample_qos(), raw=True)
-    rclpy.spin(node)
+from maglev_node.topics import KEPT, KEYS, MEASUREMENT
 
 
 def publish(depth: int, seconds: int) -> None:
     """Print what a publish takes, a second after the other."""
-    reader = subprocess.Popen([sys.executable, __file__, 'subscribe'])
-    rclpy.init()
-    node = rclpy.create_node('writer')
-    publisher = node.create_publisher(Measurement, MEASUREMENT, sample_qos(depth))
     message = Outgoing(KEYS[MEASUREMENT], 'stage')
-    try:
-        while not publisher.get_subscription_count():
-            time.sleep(0.1)
-        reader.send_signal(signal.SIGSTOP)
-        found, due = [], time.perf_counter()
+    with unheard(depth) as publisher:
+        due = time.perf_counter()
         for _ in range(seconds):
             took = []
             for _ in range(1000):
@@ -53,20 +37,14 @@ def publish(depth: int, seconds: int) -> None:
                 begun = time.perf_counter()
                 publisher.publish(message.serialized())
                 took.append(time.perf_counter() - begun)
-            found.append(1e6 * statistics.median(took))
-    finally:
-        reader.kill()
-        reader.wait()
-    print(' '.join(f'{each:5.0f}' for each in found), flush=True)
+            print(f' {1e6 * statistics.median(took):5.0f}', end='', flush=True)
+    print()
 
 
 def main() -> None:
     """All of them, or one."""
-    prepare_middleware()
     match sys.argv[1:]:
-        case ['subscribe']:
-            subscribe()
-        case ['publish', depth, heap, seconds]:
+        case [depth, heap, seconds]:
             if heap == 'kept':
                 keep_heap()
             publish(int(depth), int(seconds))
@@ -74,8 +52,7 @@ def main() -> None:
             seconds = given[0] if given else '18'
             for depth, heap in itertools.product(sorted(set(KEPT.values())), ('as it is', 'kept')):
                 print(f'{depth:6d} samples, heap {heap:9s}', end='', flush=True)
-                command = [sys.executable, __file__, 'publish', str(depth), heap, seconds]
-                subprocess.run(command, check=True)
+                subprocess.run([sys.executable, __file__, str(depth), heap, seconds], check=True)
 
 
 if __name__ == '__main__':

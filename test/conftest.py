@@ -17,10 +17,6 @@ settings.load_profile('loaded')
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as a script's background jobs have it
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-_OFTEN = 1e-3
-"""Share of a bare thread's looks that are late, at most, where a machine keeps time. A quiet one
-has 0.03 to 0.04 %; of nine flights between two hosts at 0.02 to 0.16 % one was lost, at 0.12 %."""
-
 _late = ''  # that the machine does not keep time, and where that was found out
 
 _worker = os.environ.get('PYTEST_XDIST_WORKER', 'gw0').removeprefix('gw')
@@ -67,7 +63,7 @@ def _flown(item: pytest.Item, nextitem: pytest.Item | None) -> list[pytest.TestR
         with Witness() as witness:
             reports = runtestprotocol(item, log=False, nextitem=nextitem)
         failed = [report for report in reports if report.failed]
-        if not failed or not (witness.disturbed or witness.share > _OFTEN):
+        if not failed or not witness.disturbed:
             return reports
         lost = (
             f'lost while a SCHED_FIFO thread was late by up to {witness.worst:.4f} s, and in'
