@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from flight import BRISK, ELLIPSE, LOWER_STOP
+from flight import BRISK, ELLIPSE, LOWER_STOP, SWIFT, samples
 from graph import PARAMS, Nodes, Observer, Process
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
@@ -197,8 +197,9 @@ def fly(
     observer.watch(MEASUREMENT, REFERENCE, CURRENTS, CONTROLLER_STATE, TRUE_STATE)
     common = f'mode:={mode}', 'watchers:=[observer]'  # by the test
     graph = {
-        'stage': stage or nodes.start('hw_bridge', *common, *arguments, params=FILES['hw_bridge']),
-        'controller': nodes.start('controller', *common),
+        'stage': stage
+        or nodes.start('hw_bridge', *common, *SWIFT, *arguments, params=FILES['hw_bridge']),
+        'controller': nodes.start('controller', *common, *SWIFT),
         'reference': nodes.start(
             *('reference', *common, 'duration:=600.0', *BRISK), params=(ELLIPSE,)
         ),
@@ -246,8 +247,10 @@ def test_an_emergency_stop_lands_and_stays(nodes: Nodes, observer: Observer) -> 
     observer.wait(lambda: observer.call('/hw_bridge/reset').success)
     ended = ControllerState.DISABLED, ControllerState.FAULT  # where samples passed it by
     observer.wait(lambda: observer.newest(CONTROLLER_STATE).mode in ended)
-    rest = [np.mean(message.gap) for message in observer.look()[MEASUREMENT][-200:]]
-    assert min(rest) > LOWER_STOP - 1e-5
+    samples(observer, 100)
+    assert np.min(np.mean(observer.messages[MEASUREMENT].every('gap')[-100:], axis=1)) > (
+        LOWER_STOP - 1e-5
+    )
 
 
 def test_deactivated_in_flight_it_lands_first(nodes: Nodes, observer: Observer) -> None:
@@ -260,7 +263,7 @@ def test_deactivated_in_flight_it_lands_first(nodes: Nodes, observer: Observer) 
 
 
 def landed_softly(observer: Observer) -> bool:
-    gaps = np.array([np.mean(message.gap) for message in observer.messages[MEASUREMENT]])
+    gaps = np.mean(observer.messages[MEASUREMENT].every('gap'), axis=1)
     return bool(np.max(np.abs(np.diff(gaps[-2000:]))) < 5e-5)  # 0.05 m/s
 
 

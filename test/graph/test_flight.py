@@ -111,11 +111,18 @@ def test_all_that_a_flight_bears(nodes: Nodes, watching: Observer) -> None:
     assert gap(watching) == pytest.approx(LOWER_STOP, abs=1e-5)
 
 
+def lift_off_of_age(graph: dict[str, Process], watching: Observer) -> None:
+    """Be in the air with nodes that are there for five seconds, most of which they rest."""
+    graph['reference'].wait_for('resting until ~/lift_off')
+    time.sleep(5.0)
+    assert watching.call('/reference/lift_off').success
+    watching.wait(lambda: airborne(watching))
+
+
 def test_in_flight_one_reference_is_followed(nodes: Nodes, watching: Observer) -> None:
     """One that comes later speaks further ahead, of another place, and with numbers of its own."""
-    graph = fly(nodes, LONG)
-    watching.wait(lambda: airborne(watching))
-    time.sleep(5.0)  # while it is young, a reference leaves where there is another
+    graph = fly(nodes, LONG, 'autostart:=false')
+    lift_off_of_age(graph, watching)  # while it is young, a reference leaves where there is another
     second = watching.node.create_publisher(Reference, REFERENCE, reference_qos())
     stray = Reference(phase=Reference.HOLD, position=[0.02, 0.02, 0.0, 0.0, 0.0], session=7)
     begin = watching.newest(MEASUREMENT).sequence
@@ -135,9 +142,8 @@ def test_what_a_second_stage_repeats_does_not_stop_the_flight(
     nodes: Nodes, watching: Observer
 ) -> None:
     """It covers what the stage measured last, for a reference that looks seldom."""
-    graph = fly(nodes, LONG, 'poll_period:=0.05')
-    watching.wait(lambda: airborne(watching))
-    time.sleep(5.0)  # while it is young, a stage leaves where there is another
+    graph = fly(nodes, LONG, 'autostart:=false', 'poll_period:=0.05')
+    lift_off_of_age(graph, watching)  # while it is young, a stage leaves where there is another
     second = watching.node.create_publisher(Measurement, MEASUREMENT, sample_qos())
     gap = [LOWER_STOP] * 4
     end = time.monotonic() + 2.0

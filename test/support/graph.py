@@ -14,6 +14,7 @@ from multiprocessing import forkserver
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import rclpy
 from ament_index_python.packages import get_package_prefix
 from forked import run_script
@@ -24,9 +25,10 @@ from rclpy.serialization import deserialize_message
 from rclpy.task import Future
 from std_srvs.srv import SetBool, Trigger
 
+from maglev_model.wire import record_type
 from maglev_node.dds import prepare_middleware
 from maglev_node.polling import PolledSubscription, PollingNode
-from maglev_node.topics import SAMPLE_TOPICS
+from maglev_node.topics import KEYS, SAMPLE_TOPICS
 
 ROOT = Path(__file__).resolve().parents[2]
 PARAMS = ROOT / 'params'
@@ -175,9 +177,10 @@ class Nodes:
 class Heard(Sequence[Any]):
     """Messages of a topic as they came; each is decoded when somebody looks at it."""
 
-    def __init__(self, kind: type) -> None:
-        self._kind = kind
-        self._held: list[Any] = []
+    def __init__(self, topic: str) -> None:
+        self._kind, self._key = SAMPLE_TOPICS[topic], KEYS[topic]
+        self._held: list[bytes] = []
+        self._decoded: dict[int, Any] = {}
 
     def add(self, taken: Iterable[bytes]) -> None:
         """Keep more."""
@@ -189,10 +192,15 @@ class Heard(Sequence[Any]):
     def __getitem__(self, index: Any) -> Any:
         if isinstance(index, slice):
             return [self[each] for each in range(*index.indices(len(self)))]
-        message = self._held[index]
-        if isinstance(message, bytes):
-            message = self._held[index] = deserialize_message(message, self._kind)
-        return message
+        index = range(len(self))[index]
+        if index not in self._decoded:
+            self._decoded[index] = deserialize_message(self._held[index], self._kind)
+        return self._decoded[index]
+
+    def every(self, field: str) -> np.ndarray:
+        """One field of all messages, which are of one sender."""
+        layout = record_type(self._key, self._held[0])
+        return np.frombuffer(b''.join(self._held), layout)[field]
 
 
 class Observer:
@@ -219,7 +227,7 @@ class Observer:
     def watch(self, *topics: str) -> None:
         """Keep the messages of these topics from now on."""
         for topic in topics:
-            self.messages[topic] = Heard(SAMPLE_TOPICS[topic])
+            self.messages[topic] = Heard(topic)
             self._subscriptions[topic] = self.node.poll(topic, SAMPLE_TOPICS[topic], raw=True)
 
     def look(self) -> dict[str, Heard]:

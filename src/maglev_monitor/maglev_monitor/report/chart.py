@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from bokeh.document import Document
 from bokeh.embed import components
 from bokeh.models import (
     BoxAnnotation,
@@ -212,6 +213,10 @@ def render(charts: Sequence[Chart]) -> list[str]:
     if not charts:
         return []
     panels = [panel for chart in charts for panel in chart.panels]
+    document = Document()
+    with document.models.freeze():  # else each panel has all before it looked through again
+        for panel in panels:
+            document.add_root(panel)
     script, divisions = components(panels)
     rest = iter(divisions)
     parts = [Resources(mode='inline', components=['bokeh']).render_js()]
