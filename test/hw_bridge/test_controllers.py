@@ -19,6 +19,7 @@ from maglev_node.sampling import Sampling
 PERIOD = 1e-3
 SOFT = 0.01  # [m/s]
 LOWER_STOP = 0.031
+SWIFT = {'landing.braking_time': 0.1, 'landing.descent_time': 0.8, 'landing.settle_time': 0.05}
 
 
 class Controller:
@@ -68,7 +69,7 @@ class Loop:
     """A bridge as its node runs it in real time, a controller, and a platen put in the air."""
 
     def __init__(self, target: Target = ellipse, samples: int = 200) -> None:
-        self.flight = Flight(target)
+        self.flight = Flight(target, SWIFT)
         self.stage, self.rig = self.flight.stage, self.flight.rig
         self.rig.place(np.array([LOWER_STOP, 0.0, 0.0, 0.0, 0.0]))
         self.stage.deactivate()
@@ -96,8 +97,8 @@ class Loop:
                 message for controller in self.controllers for message in controller.said(now)
             ]
             self.node.tick()
-            measured = self.node.topics[Measurement].newest
-            sample = np.array(measured.gap), measured.x, measured.z
+            measured = self.node.topics[Measurement].received
+            sample = measured.gap, measured.x, measured.z
             for controller in self.controllers:
                 controller.hear(now, measured.sequence, sample, self.flies)
             if self.stage.fault is not None and not self.detected:

@@ -10,9 +10,13 @@ from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
 from rosgraph_msgs.msg import Clock
 
+from maglev_model.wire import Incoming
 from maglev_msgs.msg import Measurement
 from maglev_node.stage_parameters import ClockedStageParameters
 from maglev_node.stamp import nanoseconds, set_stamp
+from maglev_node.topics import KEYS, SAMPLE_TOPICS
+
+KEYS_OF_KINDS = {kind: KEYS[topic] for topic, kind in SAMPLE_TOPICS.items()}
 
 
 class Topic:
@@ -20,8 +24,10 @@ class Topic:
 
     def __init__(self, kind: type) -> None:
         self._kind = kind
+        self._read: Any = None
+        self._message = b''
+        self.received: Any = None  # the newest, as nodes read it
         self.sequences: list[int] = []
-        self.newest: Any = None
         self.stamps: list[int] = []
         self.stamp_of: dict[int, int] = {}
 
@@ -29,11 +35,17 @@ class Topic:
         if isinstance(message, Clock):
             self.stamps.append(nanoseconds(message.clock))
             return
-        message = deserialize_message(message, self._kind)
-        self.sequences.append(message.sequence)
-        self.stamps.append(nanoseconds(message.header.stamp))
-        self.stamp_of[message.sequence] = self.stamps[-1]
-        self.newest = message
+        if self._read is None:
+            self._read = Incoming(KEYS_OF_KINDS[self._kind]).read
+        self._message, self.received = message, self._read(message)
+        self.sequences.append(self.received.sequence)
+        self.stamps.append(self.received.stamp)
+        self.stamp_of[self.received.sequence] = self.stamps[-1]
+
+    @property
+    def newest(self) -> Any:
+        """The newest message."""
+        return deserialize_message(self._message, self._kind)
 
 
 class Timer:
