@@ -32,6 +32,7 @@ STAGES: dict[str, Callable[[], Stage]] = {
 }
 TIMED = ('hw_bridge, real time',)
 ZERO = np.zeros(4)
+BEHIND = 60  # samples at most
 FALLING = np.full(4, 0.1)  # [A]
 LIFTING = np.full(4, -0.6)  # [A]; for some samples only: it falls back, not up to the magnets
 
@@ -75,8 +76,16 @@ def lift(stage: Stage, samples: int = 6) -> EncoderSample:
 
 
 def lifts(stage: Stage) -> bool:
-    """Whether currents are followed, seen from rest."""
-    return bool(np.all(lift(stage).gap < 0.03095))
+    """Whether currents are followed, seen from rest.
+
+    In real time only after what was sampled while the machine was busy elsewhere.
+    """
+    stage.read()
+    for _ in range(BEHIND):
+        stage.write(LIFTING, ZERO)
+        if np.all(stage.read().gap < 0.03095):
+            return True
+    return False
 
 
 def come_to_rest(stage: Stage) -> None:
