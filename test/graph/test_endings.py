@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import re
 import signal
+import time
 from pathlib import Path
 
+import numpy as np
 import pytest
-from graph import Nodes
+from flight import LONG, airborne, fly
+from graph import Nodes, Observer
 from rclpy.utilities import get_rmw_implementation_identifier
+
+from maglev_monitor.bag.columns import table
+from maglev_msgs.msg import ControllerState
 
 
 def shared_memory(pid: int) -> list[str]:
@@ -48,3 +54,22 @@ def test_what_never_waits_in_real_time_ends_in_order_and_says_so(nodes: Nodes) -
     stage.signal(signal.SIGXCPU)
     assert stage.wait() == 1
     assert 'too slow or too busy for real time' in stage.output
+
+
+def test_its_last_words_reach_a_recorder_that_lags(
+    nodes: Nodes, watching: Observer, tmp_path: Path
+) -> None:
+    recorder = nodes.start('recorder', f'output:={tmp_path / "bag"}')
+    graph = fly(nodes, LONG, watched=('watchers:=[observer, recorder]',))
+    watching.wait(lambda: airborne(watching))
+    recorder.signal(signal.SIGSTOP)
+    graph['controller'].signal(signal.SIGTERM)
+    graph['controller'].wait_for('disabled at sample')
+    time.sleep(0.7)
+    recorder.signal(signal.SIGCONT)
+    assert graph['controller'].wait() == 0
+    recorder.signal(signal.SIGINT)
+    assert recorder.wait() == 0, recorder.output
+    modes = table(tmp_path / 'bag').columns['mode']
+    assert modes[modes >= 0][-1] == ControllerState.DISABLED
+    assert np.count_nonzero(modes == ControllerState.LANDING) > 900

@@ -26,7 +26,7 @@ from maglev_node.discovery import discovering
 from maglev_node.node import MaglevNode, NodeError, spin
 from maglev_node.usage import usage
 
-_DELIVERY_TIME = 0.5
+_DELIVERY_TIME = 2.0
 """Longest wait at the end for readers to have what was published [s]."""
 
 _LEAVING_TIME = 5.0
