@@ -244,9 +244,9 @@ def _standing_on(module: str) -> set[str]:
 
 
 class Copy:
-    """A copy of the tree, with compiled code of its own."""
+    """A copy of the tree, with compiled code and a ROS domain of its own."""
 
-    def __init__(self, where: Path) -> None:
+    def __init__(self, where: Path, domain: int) -> None:
         self.where = where
         self._cache, self._warm = where / 'numba', where / 'warm'
         listed = subprocess.run(
@@ -265,6 +265,7 @@ class Copy:
         self._environment = os.environ | {
             'PYTHONPATH': f'{packages}:{os.environ.get("PYTHONPATH", "")}',
             'NUMBA_CACHE_DIR': str(self._cache),
+            'ROS_DOMAIN_ID': str(domain),
             'PYTEST_DISABLE_PLUGIN_AUTOLOAD': '1',
             'PYTHONDONTWRITEBYTECODE': '1',
             'HYPOTHESIS_STORAGE_DIRECTORY': str(where / 'hypothesis'),
@@ -342,8 +343,8 @@ def run(modules: list[str], number: int, seed: int, jobs: int) -> list[Outcome]:
     print(f'{len(drawn)} of {len(every)} mutants of {len(modules)} modules', flush=True)
     stages = {stage for module in modules for stage in LOOKED_AT_BY[module]}
     with tempfile.TemporaryDirectory(prefix='maglev-mutants') as folder:
-        copies = [Copy(Path(folder, str(job))) for job in range(jobs)]
-        took = max(copy.warm_up(tests) for copy in copies for tests in stages)
+        first = int(os.environ.get('ROS_DOMAIN_ID') or 0)
+        copies = [Copy(Path(folder, str(job)), (first + job) % 200) for job in range(jobs)]
         outcomes: list[Outcome] = []
 
         def work(copy: Copy, share: list[Mutant]) -> None:
@@ -356,6 +357,7 @@ def run(modules: list[str], number: int, seed: int, jobs: int) -> list[Outcome]:
                 print(f'\r{len(outcomes)}/{len(drawn)}', end='', file=sys.stderr, flush=True)
 
         with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
+            took = max(pool.map(lambda copy: max(map(copy.warm_up, stages)), copies))
             list(pool.map(work, copies, [drawn[job::jobs] for job in range(jobs)]))
     return outcomes
 
