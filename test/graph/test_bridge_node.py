@@ -247,8 +247,8 @@ def test_an_emergency_stop_lands_and_stays(nodes: Nodes, observer: Observer) -> 
     observer.wait(lambda: observer.call('/hw_bridge/reset').success)
     ended = ControllerState.DISABLED, ControllerState.FAULT  # where samples passed it by
     observer.wait(lambda: observer.newest(CONTROLLER_STATE).mode in ended)
-    samples(observer, 100)
-    assert np.min(np.mean(observer.messages[MEASUREMENT].every('gap')[-100:], axis=1)) > (
+    samples(observer, 200)
+    assert np.min(np.mean(observer.messages[MEASUREMENT].every('gap')[-200:], axis=1)) > (
         LOWER_STOP - 1e-5
     )
 

@@ -70,6 +70,8 @@ def test_its_emergency_stop_lands_and_stays(nodes: Nodes, watching: Observer) ->
     assert not watching.call('/controller/reset').success
     graph['stage'].signal(signal.SIGCONT)
     landed_softly(watching)
+    states = [m for m in watching.look()[CONTROLLER_STATE] if m.sequence > before]
+    assert ControllerState.LANDING in {m.mode for m in states}
     watching.wait(lambda: watching.newest(CONTROLLER_STATE).mode == ControllerState.FAULT)
     assert not watching.call('/controller/enable', True).success
     assert watching.call('/controller/reset').success
@@ -97,7 +99,7 @@ def judge_whose_currents_flow(watching: Observer) -> None:
     said = {m.sequence: m.controller for m in topics[MEASUREMENT]}
     assert set(said.values()) == {0, *flown.values()}
     follow = [number for number in flown if flown.get(number - 1) and number in said]
-    assert len(follow) > 500
+    assert len(follow) > 1000
     assert all(said[number] == flown[number] for number in follow)
 
 

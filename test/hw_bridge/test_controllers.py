@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bridge_flight import Flight, Target, ellipse, hover
+from flight import SWIFT_LANDING
 from made_up_node import MadeUpNode
 
 from maglev_controller.regulator import MeasurementFault
@@ -19,7 +20,6 @@ from maglev_node.sampling import Sampling
 PERIOD = 1e-3
 SOFT = 0.01  # [m/s]
 LOWER_STOP = 0.031
-SWIFT = {'landing.braking_time': 0.1, 'landing.descent_time': 0.8, 'landing.settle_time': 0.05}
 
 
 class Controller:
@@ -69,7 +69,7 @@ class Loop:
     """A bridge as its node runs it in real time, a controller, and a platen put in the air."""
 
     def __init__(self, target: Target = ellipse, samples: int = 200) -> None:
-        self.flight = Flight(target, SWIFT)
+        self.flight = Flight(target, dict(SWIFT_LANDING))
         self.stage, self.rig = self.flight.stage, self.flight.rig
         self.rig.place(np.array([LOWER_STOP, 0.0, 0.0, 0.0, 0.0]))
         self.stage.deactivate()

@@ -13,6 +13,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from rclpy.duration import Duration
 
 from maglev_node import process
 from maglev_node.node import NodeError
@@ -24,7 +25,7 @@ ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 class Node:
     """A node whose poll of signals comes after what ``meanwhile`` does, at most a few times."""
 
-    publishers = ()
+    publishers: tuple[Any, ...] = ()
     exit_code = None
 
     def __init__(self, meanwhile: Callable[[], None], agrees: Callable[[], bool]) -> None:
@@ -155,6 +156,24 @@ def test_several_nodes_end_when_all_have_done_or_one_has_failed(
     )
     found = list(dict.fromkeys(done.stdout.splitlines()))  # a timer may tick twice
     assert (done.returncode, found) == (code, said), done.stderr
+
+
+def test_who_acknowledges_nothing_is_waited_for_once_and_not_by_each_node(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    waited: list[float] = []
+
+    def wait(longest: Duration) -> None:
+        waited.append(1e-9 * longest.nanoseconds)
+        time.sleep(waited[-1])
+
+    monkeypatch.setattr(process, '_DELIVERY_TIME', 0.1)
+    nodes = [Node(send(signal.SIGINT), lambda: True) for _ in range(2)]
+    for node in nodes:
+        node.publishers = (SimpleNamespace(wait_for_all_acked=wait),) * 2
+    process._close(nodes)
+    assert sum(waited) <= 0.1
+    assert [node.happened for node in nodes] == [['closed', 'destroyed']] * 2
 
 
 def test_a_middleware_that_blocks_does_not_keep_the_process() -> None:

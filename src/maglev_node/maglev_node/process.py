@@ -142,7 +142,7 @@ def _is_user_error(error: Exception) -> bool:
     return type(error).__module__.startswith(('rclpy', '_rclpy'))
 
 
-def _close(nodes: Iterable[MaglevNode[Any]]) -> None:
+def _close(nodes: Sequence[MaglevNode[Any]]) -> None:
     """The nodes' last work, then out of the graph: a middleware that blocks is left after a bound.
 
     Which is exit code 1, with the threads' tracebacks on stderr.
@@ -150,16 +150,16 @@ def _close(nodes: Iterable[MaglevNode[Any]]) -> None:
     for node in nodes:
         node.close()
     faulthandler.dump_traceback_later(_LEAVING_TIME, exit=True)
+    _deliver(nodes)
     for node in nodes:
-        _deliver(node)
         node.destroy_node()
     rclpy.try_shutdown()
     faulthandler.cancel_dump_traceback_later()
 
 
-def _deliver(node: Node) -> None:
+def _deliver(nodes: Sequence[Node]) -> None:
     """Give what was published last, such as currents of zero, the time to arrive."""
     deadline = time.monotonic() + _DELIVERY_TIME
-    for publisher in node.publishers:
+    for publisher in (each for node in nodes for each in node.publishers):
         left = max(deadline - time.monotonic(), 0.0)
         publisher.wait_for_all_acked(Duration(seconds=left))
