@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bridge_flight import Flight, Target, ellipse, hover
-from flight import SWIFT_LANDING
+from landing import SWIFT_LANDING
 from made_up_node import MadeUpNode
 
 from maglev_controller.regulator import MeasurementFault

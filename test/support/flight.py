@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from graph import Nodes, Observer, Process
+from landing import SWIFT_LANDING
 
 from maglev_node.topics import CURRENTS, MEASUREMENT, TRUE_STATE
 
@@ -19,12 +20,6 @@ BRISK = (
     *('landing.time:=0.5', 'landing.crawl_distance:=1.0e-4'),
 )
 """For the reference: up and down in a second where the default takes four."""
-SWIFT_LANDING = {
-    'landing.braking_time': 0.1,
-    'landing.descent_time': 0.8,
-    'landing.settle_time': 0.05,
-}
-"""For controller and bridge: down by themselves in a second where the default takes 2.4."""
 SWIFT = tuple(f'{name}:={value}' for name, value in SWIFT_LANDING.items())
 WATCHED = 'watchers:=[observer]'  # by the test
 LOWER_STOP = 0.031
