@@ -16,6 +16,8 @@ settings.load_profile('loaded')
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as a script's background jobs have it
     signal.signal(signal.SIGINT, signal.default_int_handler)
+if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:  # as by nohup
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 _late = ''  # that the machine does not keep time, and where that was found out
 
