@@ -28,10 +28,11 @@ if _domains:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Scenarios first, then the other tests with real nodes, which all take their time."""
+    """Scenarios and the fault campaign first, then those with real nodes, which often wait."""
 
     def place(item: pytest.Item) -> tuple[bool, bool]:
-        return item.path.name != 'test_scenarios.py', item.path.parent.name != 'graph'
+        longest = ('scenario/test_scenarios.py', 'faults/test_campaign.py')
+        return not any(map(item.path.match, longest)), item.path.parent.name != 'graph'
 
     items.sort(key=place)
 

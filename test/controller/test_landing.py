@@ -94,3 +94,12 @@ def test_a_reference_out_of_reach_is_named() -> None:
     assert 'x is 0.06' in reference_fault(PARAMETERS, np.array([0.025, 0.06, 0, 0, 0]))
     assert 'y is 25' in reference_fault(PARAMETERS, np.array([25.0, 0, 0, 0, 0]))
     assert 'theta is nan' in reference_fault(PARAMETERS, np.array([0.025, 0, 0, 0, np.nan]))
+
+
+def test_it_may_brake_on_the_lower_stop_itself_but_on_no_other() -> None:
+    """Down is where it goes; from x, z and the upper stop it keeps away."""
+    stop = np.array([UPPER[0], UPPER[1], LOWER[2], 0.0, 0.0])
+    rows = way(stop, np.zeros(5), np.zeros(5))
+    np.testing.assert_array_equal(rows[:, 0, 0], UPPER[0])
+    assert rows[-1, 0, 1] < UPPER[1]
+    assert rows[-1, 0, 2] > LOWER[2]

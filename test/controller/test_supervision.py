@@ -372,3 +372,26 @@ def test_a_landing_that_does_not_follow_is_given_up_too() -> None:
     assert set(modes) == {Mode.LANDING, Mode.FAULT}
     assert supervisor.status == Status.GAVE_UP
     assert 'y is 0.00' in supervisor.reason
+
+
+def test_why_it_does_not_regulate_is_told_from_the_beginning() -> None:
+    assert Supervisor(ControllerParameters(), enabled=False).reason == 'not enabled'
+    assert Supervisor(ControllerParameters()).reason == ''
+
+
+def test_the_law_has_answered_once_before_the_first_sample(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its compiling is not left to the first sample in flight; nothing is left of that answer."""
+    asked = []
+    step = Regulator.step
+
+    def counted(regulator: Regulator, *given: np.ndarray) -> int:
+        asked.append(given[0].copy())
+        return step(regulator, *given)
+
+    monkeypatch.setattr(Regulator, 'step', counted)
+    supervisor = Supervisor(ControllerParameters())
+    np.testing.assert_array_equal(asked, [np.full(4, 0.031)])
+    assert not supervisor.direct_current.any()
+    assert not supervisor.regulator.error.any()

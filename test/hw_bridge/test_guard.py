@@ -255,3 +255,22 @@ def test_x_that_counts_after_all_is_taken_at_its_word() -> None:
     assert watched.rate[X] == 0.0
     assert abs(watched.disturbance[X]) <= PARAMETERS.fault.friction[X]
     assert watched.unseen[4] == 0.0
+
+
+@pytest.mark.parametrize('along', [X, Z])
+def test_what_is_done_without_rests_where_it_was_read_and_the_others_move_on(along: int) -> None:
+    judge, length = guard.Guard(PARAMETERS), np.array([0.025, 0.025, 0.025, 0.025, 1e-3, 2e-3])
+    for _ in range(3):
+        judge.watch(length, np.zeros(12), True)
+    watched = judge.arrays
+    watched.position[:], watched.rate[:], watched.disturbance[:] = 4e-3, 0.1, 0.3
+    judge.lose(3 + along)
+    for of, value, then in (
+        (watched.position, 4e-3, length[3 + along]),
+        (watched.rate, 0.1, 0.0),
+        (watched.disturbance, 0.3, 0.0),
+    ):
+        wanted = np.full(5, value)
+        wanted[along] = then
+        np.testing.assert_array_equal(of, wanted)
+    assert judge.blamed == judge.failed == [3 + along]

@@ -337,3 +337,32 @@ def test_an_inverse_writes_its_answer_and_nothing_beside_it(
     for part in room:
         assert np.isnan(part[[0, -1]]).all()
         assert np.isfinite(part[1:-1]).all()
+
+
+@pytest.mark.parametrize('lift', [-1.0, 0.0, 1.0, 40.0, 100.0, 300.0, 1000.0])
+def test_levitation_leaves_the_largest_i_q_that_some_i_d_goes_with(lift: float) -> None:
+    """Found by trying 20,000 of them: (2), the amplitude within 7 A."""
+    gap = 0.025
+    output, wanted = np.array([gap, 0.0, 0.0, 0.0, 0.0]), np.array([-lift, 1e3, 1e3, 0.0, 0.0])
+    answer = Answered(exact_inverse, PRIORITY, output, wanted)
+    a, b, _ = attraction_coefficients(MACHINE, gap)
+    attraction = 0.25 * MACHINE.M_y * (MACHINE.G + lift)
+    i_q = np.linspace(0.0, 7.0, 20_001)
+    with np.errstate(invalid='ignore'):
+        i_d = (a - np.sqrt(attraction - (b * i_q) ** 2)) / b
+        fits = np.hypot(i_d, i_q) <= 7.0
+    largest = i_q[fits].max() if fits.any() else 0.0
+    np.testing.assert_allclose(np.abs(answer.quadrature), largest, atol=4e-4)
+    assert largest > 0.0 or not answer.quadrature.any()
+    assert answer.limited_by & LEVITATION
+
+
+@pytest.mark.parametrize('tilts', [0.0, 1.0])
+def test_without_priority_each_component_has_the_whole_limit(tilts: float) -> None:
+    """i_q at its limit leaves i_d its own, as the paper's saturation has it."""
+    output, wanted = np.array([0.025, 0.0, 0.0, 0.0, 0.0]), np.array([-1e3, 1e3, 1e3, 0.0, 0.0])
+    controlled = np.array([1.0, 1.0, 1.0, tilts, tilts])
+    limits = PRIORITY._replace(levitation_first=0.0)
+    answer = Answered(exact_inverse, limits, output, wanted, controlled)
+    assert np.abs(answer.quadrature) == pytest.approx(7.0)
+    assert np.abs(answer.direct) == pytest.approx(7.0)

@@ -213,8 +213,7 @@ def _correct_vertical(o: ObserverArrays, innovation: FloatArray, used: Flags) ->
         tilt_z += y if used[0] else -y
     if along_x == 1:
         tilt_x += -y if used[1] else y
-    if along_z + along_x > 0:
-        _amend(o, Y, y)
+    _amend(o, Y, y)
     if along_z == 2 or (along_z == 1 and along_x == 2):
         _amend(o, PHI, tilt_z / (along_z * r))
     if along_x == 2 or (along_x == 1 and along_z > 0):

@@ -8,8 +8,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 from maglev_study.faults.campaign import Campaign, Outcome
 from maglev_study.faults.draw import cells, from_json, scenario
 from maglev_study.faults.fly import Scenario
@@ -42,7 +40,6 @@ def failures(runs: Sequence[Scenario]) -> dict[int, str]:
     }
 
 
-@pytest.mark.alone
 def test_cells_of_fault_and_phase_and_what_was_mended_keep_the_rules() -> None:
     step = 1 if 'MAGLEV_ALL_CELLS' in os.environ else 3  # all take a minute more on two cores
     runs = {run.seed: run for run in [*map(scenario, range(0, len(cells()), step)), *FOUND]}
