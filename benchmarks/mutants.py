@@ -142,8 +142,9 @@ def _values(node: ast.AST) -> Iterator[Edit]:
 
 
 def _order_matters(call: ast.Call) -> bool:
-    name = ast.unparse(call.func).removeprefix('math.').removeprefix('np.')
-    either = name in ('min', 'max', 'minimum', 'maximum', 'hypot')
+    name = ast.unparse(call.func)
+    either = name.rsplit('.', 1)[-1] in ('min', 'max', 'minimum', 'maximum', 'hypot')
+    either |= name == 'np.clip'  # a value and its lower bound
     return len(call.args) >= 2 and not either and ast.dump(call.args[0]) != ast.dump(call.args[1])
 
 
@@ -190,6 +191,8 @@ def _inside(node: ast.AST) -> Iterator[ast.AST]:
     for name, field in ast.iter_fields(node):
         if name in ('annotation', 'returns') or isinstance(node, ast.JoinedStr):
             continue
+        if isinstance(node, ast.Call) and ast.unparse(node.func) == 'np.empty':
+            continue  # more room than is needed changes nothing
         for child in field if isinstance(field, list) else [field]:
             if isinstance(child, ast.AST):
                 yield child

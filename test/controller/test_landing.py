@@ -42,6 +42,8 @@ def test_from_any_reference_smoothly_to_the_stop(
     path, rate = rows[:, 0], rows[:, 1]
     steps = np.diff(path, axis=0) - 0.5e-3 * (rate[1:] + rate[:-1])
     assert np.abs(steps).max() < 1e-6
+    push_by_push = np.diff(rate, axis=0) - 0.5e-3 * (rows[1:, 2] + rows[:-1, 2])
+    assert np.abs(push_by_push).max() < 1e-4
     assert np.all(path >= LOWER - 1e-9)
     assert np.all(path <= UPPER + 1e-9)
     np.testing.assert_allclose(path[-1, [0, 3, 4]], [0.031, 0.0, 0.0], atol=1e-12)
@@ -97,9 +99,33 @@ def test_a_reference_out_of_reach_is_named() -> None:
 
 
 def test_it_may_brake_on_the_lower_stop_itself_but_on_no_other() -> None:
-    """Down is where it goes; from x, z and the upper stop it keeps away."""
+    """Down is where it goes; from those of x and z it keeps away, by 3 % of their way."""
     stop = np.array([UPPER[0], UPPER[1], LOWER[2], 0.0, 0.0])
     rows = way(stop, np.zeros(5), np.zeros(5))
     np.testing.assert_array_equal(rows[:, 0, 0], UPPER[0])
-    assert rows[-1, 0, 1] < UPPER[1]
-    assert rows[-1, 0, 2] > LOWER[2]
+    off = 0.03 * (UPPER - LOWER)
+    np.testing.assert_allclose(rows[-1, 0, 1:3], [UPPER[1] - off[1], LOWER[2] + off[2]])
+
+
+def test_it_brakes_over_half_of_what_its_speed_would_cover() -> None:
+    """So that a constant deceleration would do it; what moves is not thrown back."""
+    speed = np.array([0.01, 0.1, -0.06, 0.0, 0.0])
+    rows = way(np.array([0.025, 0.0, 0.0, 0.0, 0.0]), speed, np.zeros(5))
+    braking = PARAMETERS.landing.braking_time
+    gone = rows[round(braking / PARAMETERS.sample_time), 0] - rows[0, 0]
+    np.testing.assert_allclose(gone[:3], 0.5 * braking * speed[:3])
+
+
+@pytest.mark.parametrize('axis', range(5))
+def test_a_reference_may_stand_beyond_a_stop_by_the_margin_and_no_more(axis: int) -> None:
+    """Of the tilts: by what it is at the motors."""
+    margin = PARAMETERS.measurement.margin
+    slack = margin if axis < 3 else margin / PARAMETERS.machine.radius
+    for stop, way_out in ((UPPER, 1.0), (LOWER, -1.0)):
+        position = np.array([0.025, 0.0, 0.0, 0.0, 0.0])
+        position[axis] = stop[axis] + way_out * slack
+        assert reference_fault(PARAMETERS, position) == ''
+        position[axis] += way_out * 0.01 * slack
+        assert f'reference {("y", "x", "z", "phi", "theta")[axis]} is' in reference_fault(
+            PARAMETERS, position
+        )

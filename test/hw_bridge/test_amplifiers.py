@@ -9,7 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from maglev_hw_bridge.amplifiers import FINE, NOT_FINITE, OVER_CURRENT, OVER_LIMIT, Amplifiers
+from maglev_hw_bridge.amplifiers import (
+    FINE,
+    NOT_FINITE,
+    OVER_CURRENT,
+    OVER_LIMIT,
+    SPENT,
+    Amplifiers,
+)
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_model.parameters import ParameterError, build
 
@@ -65,7 +72,7 @@ def test_volts_to_currents_to_dq_and_back(
 @given(commands=st.lists(st.tuples(FOUR, FOUR), min_size=1, max_size=6), x=PLACE, z=PLACE)
 def test_nothing_leaves_its_limits(commands: list, x: float, z: float) -> None:
     slew = 2000.0
-    unit = amplifiers(amplifier__slew=slew)
+    unit = Amplifiers(build(BridgeParameters, {**WIRED, 'amplifier.slew': slew}))
     unit.arrays.voltage_range = 3.0  # which parameters refuse: less than the peak
     last = np.zeros(12)
     for i_d, i_q in commands:
@@ -73,6 +80,8 @@ def test_nothing_leaves_its_limits(commands: list, x: float, z: float) -> None:
         assert np.all(np.abs(unit.volts) <= 3.0)
         assert np.all(np.abs(unit.arrays.current) <= 7.0)
         assert np.all(np.abs(unit.arrays.current - last) <= slew * 1e-3 + 1e-12)
+        said = np.array(ZERO) + np.array(SIGN) / np.array(GAIN) * unit.arrays.current
+        np.testing.assert_allclose(unit.volts, said, atol=1e-12)
         last = unit.arrays.current.copy()
 
 
@@ -136,3 +145,48 @@ def test_cut_makes_no_current_at_once() -> None:
     assert not np.any(unit.arrays.current)
     unit.drive(np.zeros(4), np.zeros(4), 0.0, 0.0)  # and there is no slope left to go down
     assert unit.volts.tolist() == list(ZERO)
+
+
+def test_what_comes_of_a_command_is_told_apart() -> None:
+    assert len({FINE, NOT_FINITE, OVER_LIMIT, OVER_CURRENT, SPENT}) == 5
+
+
+@pytest.mark.parametrize(('way', 'limit'), [(0.0, 7.0), (0.25, 6.5), (1.0, 5.0), (1.3, 5.0)])
+def test_a_phase_that_is_hot_carries_less(way: float, limit: float) -> None:
+    """From its peak at the load where that begins to shrink down to what it may carry for ever."""
+    loads = {'amplifier.derate_load': 0.8, 'amplifier.trip_load': 1.2}  # halfway is all done
+    currents = {'amplifier.continuous_current': 5.0, 'amplifier.peak_current': 7.0}
+    unit = Amplifiers(build(BridgeParameters, {**loads, **currents}))
+    unit.arrays.load[:] = 0.8 + way * 0.2
+    assert unit.drive_phases(np.tile([9.0, -9.0], 6)) == pytest.approx(np.tile([limit, -limit], 6))
+
+
+@pytest.mark.parametrize('phase', [0, 5, 11])
+def test_one_phase_is_enough_to_be_spent(phase: int) -> None:
+    unit, zero = amplifiers(), np.zeros(4)
+    unit.arrays.load[:] = 0.25
+    unit.arrays.load[phase] = 0.5
+    unit.arrays.heating = 0.0  # so that it is what it is
+    unit.arrays.trip = 0.5
+    assert unit.drive(zero, zero, 0.0, 0.0) == (SPENT, phase)
+    unit.arrays.trip = np.nextafter(0.5, 1.0)
+    assert unit.drive(zero, zero, 0.0, 0.0) == (FINE, 0)
+
+
+def test_what_is_just_allowed_is_put_out() -> None:
+    unit = amplifiers()
+    unit.arrays.command_limit = 5.0
+    assert unit.drive(np.full(4, 3.0), np.full(4, -4.0), 0.0, 0.0) == (FINE, 0)
+    largest = np.abs(unit.arrays.wanted).max()
+    unit.arrays.trip_current = largest
+    assert unit.drive(np.full(4, 3.0), np.full(4, -4.0), 0.0, 0.0) == (FINE, 0)
+    unit.arrays.trip_current = np.nextafter(largest, 0.0)
+    assert unit.drive(np.full(4, 3.0), np.full(4, -4.0), 0.0, 0.0)[0] == OVER_CURRENT
+
+
+def test_it_is_warm_from_where_it_shall_warn() -> None:
+    unit = amplifiers(amplifier__warn_load=0.5)
+    unit.arrays.load[7] = 0.5
+    assert unit.warm
+    unit.arrays.load[7] = 0.49
+    assert not unit.warm

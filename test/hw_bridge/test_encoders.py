@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -67,6 +69,46 @@ def test_homing_wants_a_platen_at_rest() -> None:
     with pytest.raises(HomingError, match='encoder x moves by 40 um'):
         unit.home(readings)
     assert not unit.homed
+    readings[7:, 4] = 1
+    spread = unit.arrays.scale[4]
+    unit._homing = dataclasses.replace(unit._homing, spread=0.9 * spread)
+    with pytest.raises(HomingError):
+        unit.home(readings)
+    unit._homing = dataclasses.replace(unit._homing, spread=spread)
+    unit.home(readings)
+
+
+@pytest.mark.parametrize('counter', [0, 2**30, -(2**30), 2**31, -(2**31)])
+def test_it_is_homed_where_it_was_read_last_wherever_the_counters_stand(counter: int) -> None:
+    """A counter that rolls over meanwhile has not moved by its whole range."""
+    unit = encoders()
+    readings = np.array([as_counts([counter + step] * 6) for step in (0, -1, -1, 0, 1)])
+    unit.start(readings[0])
+    unit.home(readings)
+    home = [0.031] * 4 + [-0.05] * 2
+    assert unit.arrays.length == pytest.approx(home, abs=1e-12)
+    for away in (-30, 30):
+        moved = unit.decode(as_counts([counter + 1 + away] * 6)) - home
+        assert moved == pytest.approx(away * unit.arrays.scale, abs=1e-11)
+        unit.home(np.tile(as_counts([counter + 1] * 6), (3, 1)))
+
+
+@pytest.mark.parametrize('encoder', range(6))
+@pytest.mark.parametrize('side', ['lower', 'upper'])
+def test_what_reads_half_a_millimetre_beyond_a_stop_is_named(encoder: int, side: str) -> None:
+    parameters = BridgeParameters()
+    fault, machine = parameters.fault, parameters.machine
+    gaps = {'lower': fault.gap_lower, 'upper': fault.gap_upper}
+    reach = {'lower': -1.0, 'upper': 1.0}[side]
+    stop = (*[gaps[side]] * 4, reach * machine.x_max, reach * machine.z_max)[encoder]
+    unit, middle = Encoders(parameters), [0.025] * 4 + [0.0] * 2
+    unit.arrays.length[:] = middle
+    assert unit.beyond_stops() == ''
+    unit.arrays.length[encoder] = stop + reach * 0.0005
+    assert unit.beyond_stops() == ''
+    unit.arrays.length[encoder] += reach * 1e-6
+    name = ('gap 1', 'gap 2', 'gap 3', 'gap 4', 'x', 'z')[encoder]
+    assert unit.beyond_stops().startswith(f'encoder {name} reads {1e3 * stop + reach * 0.5:.2f} mm')
 
 
 def test_a_second_homing_elsewhere_is_refused() -> None:

@@ -167,3 +167,20 @@ def test_who_gives_up_at_rest_has_to_be_taken_up_again() -> None:
 def test_before_any_command_nobody_is_followed_blamed_or_has_given_up() -> None:
     watch = ControllerWatch()
     assert (watch.taken_up, watch.why, watch.gave_up) == (False, '', False)
+
+
+def test_the_very_first_sample_may_be_answered_and_a_stage_may_begin_anew() -> None:
+    flight = Flight()
+    for beginning in (5, 0):
+        flight.sample = beginning
+        assert flight.hear(REST) is Verdict.FOLLOWED
+        flight.watch.forget()
+
+
+def test_each_status_has_a_number_that_stays() -> None:
+    """It is what goes over the wire."""
+    assert [(status.name, status.value) for status in Status] == [
+        ('RESTING', 0),
+        ('FLYING', 1),
+        ('GAVE_UP', 2),
+    ]

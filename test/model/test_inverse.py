@@ -6,12 +6,14 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from answered import ALL, MACHINE, PRIORITY, WIDE, Answered, gentle, outputs, rough
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from maglev_model.inverse import (
     CURRENT,
     LEVITATION,
+    NO_LIMITS,
     Answer,
     CurrentLimits,
     exact_inverse,
@@ -20,48 +22,6 @@ from maglev_model.inverse import (
 from maglev_model.machine import MachineParameters, machine_constants
 from maglev_model.motor import attraction_coefficients
 from maglev_model.platen import accelerations, affine_terms
-
-MACHINE = machine_constants(MachineParameters())
-ALL = np.ones(5)
-WIDE = CurrentLimits(current=1000.0, levitation_first=0.0, least_attraction=0.0)
-PRIORITY = CurrentLimits(current=7.0, levitation_first=1.0, least_attraction=0.1)
-
-outputs = st.tuples(
-    st.floats(0.0185, 0.0305),
-    st.floats(-0.05, 0.05),
-    st.floats(-0.05, 0.05),
-    st.floats(-0.003, 0.003),
-    st.floats(-0.012, 0.012),
-).map(np.array)
-gentle = st.tuples(
-    st.floats(-6.0, 5.0),
-    st.floats(-2.0, 2.0),
-    st.floats(-2.0, 2.0),
-    st.floats(-4.0, 4.0),
-    st.floats(-4.0, 4.0),
-).map(np.array)
-rough = st.lists(st.floats(-2e3, 2e3), min_size=5, max_size=5).map(np.array)
-
-
-class Answered:
-    """What an inverse gives for one wanted acceleration."""
-
-    def __init__(
-        self,
-        inverse: Callable[..., int],
-        limits: CurrentLimits,
-        output: np.ndarray,
-        wanted: np.ndarray,
-        controlled: np.ndarray = ALL,
-    ) -> None:
-        self.direct, self.quadrature = np.zeros(4), np.zeros(4)
-        self.realised, self.excess = np.zeros(5), np.zeros(2)
-        answer = Answer(self.direct, self.quadrature, self.realised, self.excess)
-        self.limited_by = inverse(MACHINE, limits, controlled, output, wanted, answer)
-        state = np.zeros(10)
-        state[::2] = output
-        self.plant = np.zeros(5)
-        accelerations(MACHINE, state, self.direct, self.quadrature, self.plant)
 
 
 @settings(max_examples=150, deadline=None)
@@ -106,17 +66,25 @@ def test_the_paper_leaves_a_fifth_of_the_vertical_force_out_at_20_mm() -> None:
 
 
 @settings(max_examples=200, deadline=None)
-@given(output=outputs, wanted=rough, tilt=st.sampled_from([0.3, 0.5, 0.9]))
+@given(
+    output=outputs,
+    wanted=rough,
+    tilt=st.sampled_from([0.3, 0.5, 0.9]),
+    controlled=st.tuples(*[st.just(1.0)] * 3, *[st.sampled_from([0.0, 1.0])] * 2).map(np.array),
+)
 def test_limits_hold_whatever_is_wanted(
-    output: np.ndarray, wanted: np.ndarray, tilt: float
+    output: np.ndarray, wanted: np.ndarray, tilt: float, controlled: np.ndarray
 ) -> None:
     """Phase amplitude within 7 A, and what is said to be realised is what the plant then does."""
-    answer = Answered(exact_inverse, PRIORITY._replace(tilt=tilt), output, wanted)
+    answer = Answered(exact_inverse, PRIORITY._replace(tilt=tilt), output, wanted, controlled)
     amplitude = np.hypot(answer.direct, answer.quadrature)
     assert np.all(amplitude <= PRIORITY.current * (1.0 + 1e-9))
     np.testing.assert_allclose(answer.plant, answer.realised, rtol=1e-9, atol=1e-9)
-    met = np.allclose(answer.plant, wanted, rtol=1e-6, atol=1e-6)
+    ruled = controlled != 0.0
+    met = np.allclose(answer.plant[ruled], wanted[ruled], rtol=1e-6, atol=1e-6)
     assert met or answer.limited_by != 0
+    asked = Answered(exact_inverse, WIDE._replace(current=np.inf), output, wanted).quadrature
+    np.testing.assert_allclose(answer.excess, (answer.quadrature - asked)[[1, 0]], atol=1e-9)
     at_limit = bool(np.any(amplitude >= PRIORITY.current * (1.0 - 1e-9)))
     assert bool(answer.limited_by & CURRENT) == (at_limit and answer.limited_by != 0)
 
@@ -182,6 +150,8 @@ def test_tilts_without_control_get_equal_direct_currents(inverse: Callable[..., 
     assert answer.direct[1] == pytest.approx(answer.direct[3], abs=1e-12)
     if inverse is exact_inverse:
         np.testing.assert_allclose(answer.plant[:3], wanted[:3], rtol=1e-9)
+        balance = np.array([0.0287, 0.0, 0.0, 0.0, 0.0])
+        assert np.abs(Answered(inverse, WIDE, balance, np.zeros(5), controlled).direct).max() < 0.1
 
 
 @pytest.mark.parametrize('inverse', [exact_inverse, simplified_inverse])
@@ -224,16 +194,21 @@ def test_what_limits_is_told(axis: int, wanted: float, limited_by: int) -> None:
 
 
 @pytest.mark.parametrize('axis', [3, 4])
-@pytest.mark.parametrize('tilt', [0.3, 0.5, 0.75, 0.9])
-def test_a_tilt_gets_its_share_of_the_attraction_and_no_more(axis: int, tilt: float) -> None:
+@pytest.mark.parametrize('way', [-1.0, 1.0])
+@pytest.mark.parametrize('tilt', [0.3, None, 0.75, 0.9])
+def test_a_tilt_gets_its_share_of_the_attraction_and_no_more(
+    axis: int, way: float, tilt: float | None
+) -> None:
+    """By default half, which an even split of the attraction serves."""
     hover = np.array([0.025, 0.0, 0.0, 0.0, 0.0])
-    most = tilt * MACHINE.M_y * MACHINE.G * MACHINE.r / MACHINE.I_x
+    limits = PRIORITY if tilt is None else PRIORITY._replace(tilt=tilt)
+    most = (tilt or 0.5) * MACHINE.M_y * MACHINE.G * MACHINE.r / MACHINE.I_x
     for wanted in (0.99 * most, 1.2 * most):
         w = np.zeros(5)
-        w[axis] = wanted
-        answer = Answered(exact_inverse, PRIORITY._replace(tilt=tilt), hover, w)
+        w[axis] = way * wanted
+        answer = Answered(exact_inverse, limits, hover, w)
         assert answer.limited_by == (0 if wanted < most else LEVITATION)
-        assert answer.plant[axis] == pytest.approx(min(wanted, most))
+        assert answer.plant[axis] == pytest.approx(way * min(wanted, most))
         assert answer.plant[0] == pytest.approx(0.0, abs=1e-9)
 
 
@@ -339,22 +314,58 @@ def test_an_inverse_writes_its_answer_and_nothing_beside_it(
         assert np.isfinite(part[1:-1]).all()
 
 
-@pytest.mark.parametrize('lift', [-1.0, 0.0, 1.0, 40.0, 100.0, 300.0, 1000.0])
-def test_levitation_leaves_the_largest_i_q_that_some_i_d_goes_with(lift: float) -> None:
-    """Found by trying 20,000 of them: (2), the amplitude within 7 A."""
-    gap = 0.025
-    output, wanted = np.array([gap, 0.0, 0.0, 0.0, 0.0]), np.array([-lift, 1e3, 1e3, 0.0, 0.0])
-    answer = Answered(exact_inverse, PRIORITY, output, wanted)
-    a, b, _ = attraction_coefficients(MACHINE, gap)
-    attraction = 0.25 * MACHINE.M_y * (MACHINE.G + lift)
-    i_q = np.linspace(0.0, 7.0, 20_001)
-    with np.errstate(invalid='ignore'):
-        i_d = (a - np.sqrt(attraction - (b * i_q) ** 2)) / b
-        fits = np.hypot(i_d, i_q) <= 7.0
-    largest = i_q[fits].max() if fits.any() else 0.0
-    np.testing.assert_allclose(np.abs(answer.quadrature), largest, atol=4e-4)
-    assert largest > 0.0 or not answer.quadrature.any()
-    assert answer.limited_by & LEVITATION
+@settings(max_examples=50, deadline=None)
+@given(output=outputs, wanted=gentle, scale=st.floats(1.0, 200.0))
+def test_without_limits_all_is_reached_that_attraction_can_give(
+    output: np.ndarray, wanted: np.ndarray, scale: float
+) -> None:
+    """Down to free fall, and up as hard as one likes."""
+    lifted = wanted * [1.0, scale, scale, 1.0, 1.0] - [40.0 * scale * scale, 0.0, 0.0, 0.0, 0.0]
+    answer = Answered(exact_inverse, NO_LIMITS, output, lifted)
+    assert answer.limited_by == 0
+    np.testing.assert_allclose(answer.plant, lifted, rtol=1e-6, atol=1e-5)
+    falling = np.array([MACHINE.G, 0.0, 0.0, 0.0, 0.0]) - [1e-3, 0.0, 0.0, 0.0, 0.0]
+    assert Answered(exact_inverse, NO_LIMITS, np.array([0.025, 0, 0, 0, 0]), falling).plant[
+        0
+    ] == pytest.approx(falling[0], abs=1e-9)
+
+
+@settings(max_examples=60, deadline=None)
+@given(output=outputs, wanted=gentle, free=st.sets(st.integers(0, 4)))
+@pytest.mark.parametrize('inverse', [exact_inverse, simplified_inverse])
+def test_each_axis_is_left_alone_by_itself(
+    inverse: Callable[..., int], output: np.ndarray, wanted: np.ndarray, free: set[int]
+) -> None:
+    """Those that are controlled have what they want; a free one has none of its current."""
+    controlled = ALL.copy()
+    controlled[list(free)] = 0.0
+    answer = Answered(inverse, WIDE._replace(tilt=1.0), output, wanted, controlled)
+    if answer.limited_by:
+        return
+    told = answer.realised
+    kept = [axis for axis in range(5) if axis not in free]
+    np.testing.assert_allclose(told[kept], wanted[kept], rtol=1e-8, atol=1e-8)
+    direct, quadrature = answer.direct, answer.quadrature
+    for axis, motors in ((1, [1, 3]), (2, [0, 2])):
+        assert axis not in free or not quadrature[motors].any()
+    for axis, (one, two) in ((3, (0, 2)), (4, (3, 1))):
+        assert axis not in free or direct[one] == pytest.approx(direct[two], abs=1e-9)
+    if inverse is simplified_inverse and 0 in free:
+        assert direct.sum() == pytest.approx(0.0, abs=1e-9)
+
+
+@settings(max_examples=60, deadline=None)
+@given(output=outputs, wanted=rough, current=st.sampled_from([0.5, 7.0]))
+def test_the_papers_saturation_cuts_each_current_by_itself(
+    output: np.ndarray, wanted: np.ndarray, current: float
+) -> None:
+    limits = WIDE._replace(current=current)
+    answer = Answered(simplified_inverse, limits, output, wanted)
+    asked = Answered(simplified_inverse, WIDE._replace(current=np.inf), output, wanted)
+    cut = np.clip(asked.quadrature, -current, current)
+    np.testing.assert_allclose(answer.quadrature, cut, rtol=1e-12)
+    assert np.all(np.abs(answer.direct) <= current)
+    np.testing.assert_allclose(answer.excess, (cut - asked.quadrature)[[1, 0]], atol=1e-9)
 
 
 @pytest.mark.parametrize('tilts', [0.0, 1.0])
