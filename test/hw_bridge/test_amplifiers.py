@@ -154,10 +154,10 @@ def test_what_comes_of_a_command_is_told_apart() -> None:
 @pytest.mark.parametrize(('way', 'limit'), [(0.0, 7.0), (0.25, 6.5), (1.0, 5.0), (1.3, 5.0)])
 def test_a_phase_that_is_hot_carries_less(way: float, limit: float) -> None:
     """From its peak at the load where that begins to shrink down to what it may carry for ever."""
-    loads = {'amplifier.derate_load': 0.8, 'amplifier.trip_load': 1.2}  # halfway is all done
+    loads = {'amplifier.derate_load': 0.8, 'amplifier.trip_load': 1.0}  # halfway is all done
     currents = {'amplifier.continuous_current': 5.0, 'amplifier.peak_current': 7.0}
     unit = Amplifiers(build(BridgeParameters, {**loads, **currents}))
-    unit.arrays.load[:] = 0.8 + way * 0.2
+    unit.arrays.load[:] = 0.8 + way * 0.1
     assert unit.drive_phases(np.tile([9.0, -9.0], 6)) == pytest.approx(np.tile([limit, -limit], 6))
 
 
