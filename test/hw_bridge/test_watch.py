@@ -4,41 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hovering import PARAMETERS, Hover
 
 from maglev_hw_bridge import guard
-from maglev_hw_bridge.amplifiers import Amplifiers
 from maglev_hw_bridge.guard_arrays import LOST, PUT_RIGHT, SOUND
-from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_model.axes import AXES, X, Y
-from maglev_model.inverse import NO_LIMITS, Answer, exact_inverse
-from maglev_model.machine import machine_constants
-from maglev_model.platen import gaps_from_outputs
-
-PARAMETERS = BridgeParameters()
-MACHINE = machine_constants(PARAMETERS.machine)
-
-
-class Hover:
-    """A platen that stays where it is, carried by the currents that it takes."""
-
-    def __init__(self, *, phi: float = 0.0, samples: int = 150) -> None:
-        output = np.array([0.025, 0.0, 0.0, phi, 0.0])
-        gap, direct, quadrature = np.empty(4), np.empty(4), np.empty(4)
-        gaps_from_outputs(MACHINE, output, gap)
-        answer = Answer(direct, quadrature, np.empty(5), np.empty(2))
-        exact_inverse(MACHINE, NO_LIMITS, np.ones(5), output, np.zeros(5), answer)
-        amplifiers = Amplifiers(PARAMETERS)
-        amplifiers.drive(direct, quadrature, 0.0, 0.0)
-        self.length = np.array([*gap, 0.0, 0.0])
-        self.current = amplifiers.arrays.current.copy()
-        self.judge = guard.Guard(PARAMETERS)
-        self.watched = self.judge.arrays
-        for _ in range(samples):
-            assert self.sample() == (guard.FINE, 0)
-
-    def sample(self, *, flying: bool = True, behind: int = 0) -> tuple[int, int]:
-        """What comes of one more."""
-        return self.judge.watch(self.length, self.current, flying, behind)
 
 
 def test_what_may_come_of_a_sample_is_told_apart() -> None:
@@ -93,7 +63,7 @@ def test_what_the_currents_do_not_explain_for_ten_samples_is_their_motors_fault(
 
 @pytest.mark.parametrize('why', ['on the ground', 'not settled', 'not all sound', 'on its stop'])
 def test_unless_something_else_may_explain_it(why: str) -> None:
-    hover = Hover(samples=5 if why == 'not settled' else 150)
+    hover = Hover(settled=why != 'not settled')
     hover.watched.max_unexplained[:] = -1.0  # anything is too much
     if why == 'not all sound':
         hover.watched.trust[5] = PUT_RIGHT
