@@ -6,6 +6,7 @@ import numpy as np
 
 from maglev_hw_bridge import guard
 from maglev_hw_bridge.amplifiers import Amplifiers
+from maglev_hw_bridge.guard_arrays import GuardArrays
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.standing_still import SETTLING
 from maglev_model.inverse import NO_LIMITS, Answer, exact_inverse
@@ -39,3 +40,12 @@ class Hover:
     def sample(self, *, flying: bool = True, behind: int = 0) -> tuple[int, int]:
         """What comes of one more."""
         return self.judge.watch(self.length, self.current, flying, behind)
+
+
+def hovering() -> GuardArrays:
+    """Four gaps at 25 mm, x and z in the middle; nothing counts."""
+    watched: GuardArrays = Hover().watched
+    watched.believed[:] = watched.length[:] = watched.past[0] = [0.025] * 4 + [0.0] * 2
+    watched.rigid = True
+    watched.unseen[:] = 0.0
+    return watched
