@@ -6,6 +6,7 @@ import bridge_flight
 import numpy as np
 import pytest
 from bridge_flight import Flight, hover
+from hovering import Hover
 from rough import PARAMS
 
 from maglev_controller.parameters import ControllerParameters
@@ -148,7 +149,7 @@ def test_pushed_to_and_fro_it_is_where_it_was_and_stands() -> None:
 
 def test_the_push_goes_back_over_the_edge_it_passed_last() -> None:
     asking = knock.Knock(build(BridgeParameters, {}))
-    watched = standing(0.025, 1.0).stage.guard.arrays
+    watched = Hover().watched
     for way in (1.0, -1.0):
         watched.believed[4:] += way * COUNT
         watched.silent[:] = 0
@@ -162,10 +163,7 @@ def test_the_push_goes_back_over_the_edge_it_passed_last() -> None:
 
 def test_nothing_is_asked_on_the_ground_or_with_no_current_left() -> None:
     parameters = build(BridgeParameters, {})
-    asking = knock.Knock(parameters)
-    flight = standing(0.025, 1.0)
-    watched = flight.stage.guard.arrays
-    flight.run(150)
+    asking, watched = knock.Knock(parameters), Hover().watched
     watched.silent[:] = 200
     assert asking.look(watched, False) is None
     i_d, i_q = np.zeros(4), np.zeros(4)
