@@ -14,10 +14,8 @@ when more than a twentieth of them survive.
 from __future__ import annotations
 
 import argparse
-import ast
 import concurrent.futures
 import contextlib
-import difflib
 import os
 import random
 import re
@@ -27,16 +25,19 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
-ROOT = Path(__file__).resolve().parents[1]
+from mutation import ROOT, Mutant, difference, edits_of, mutant_of, path_of
+
 ALLOWED = 0.05
 
 _CAMPAIGN = ('test/study/faults/test_campaign.py',)
 _BRIDGE = (
-    *(f'test/hw_bridge/test_{name}.py' for name in ('encoders', 'unseen', 'rough_rig')),
+    *(f'test/hw_bridge/test_{name}.py' for name in ('encoders', 'leaps', 'doubts', 'roll_call')),
+    *(f'test/hw_bridge/test_{name}.py' for name in ('standing_still', 'watch', 'observer')),
+    *(f'test/hw_bridge/test_{name}.py' for name in ('way_down', 'unseen', 'rough_rig')),
     *(f'test/hw_bridge/test_{name}.py' for name in ('amplifiers', 'guard', 'knock', 'resting')),
     *(f'test/hw_bridge/test_{name}.py' for name in ('life_cycle', 'landing')),
     'test/model/test_stage_contract.py',
@@ -62,35 +63,6 @@ LOOKED_AT_BY: dict[str, tuple[tuple[str, ...], ...]] = {
 }
 """Modules, and the tests that look at them, stage by stage, the fastest first."""
 
-_OPPOSITES: dict[type[ast.AST], tuple[type[ast.AST], ...]] = {
-    ast.Lt: (ast.LtE, ast.GtE),
-    ast.LtE: (ast.Lt, ast.Gt),
-    ast.Gt: (ast.GtE, ast.LtE),
-    ast.GtE: (ast.Gt, ast.Lt),
-    ast.Eq: (ast.NotEq,),
-    ast.NotEq: (ast.Eq,),
-    ast.Is: (ast.IsNot,),
-    ast.IsNot: (ast.Is,),
-    ast.In: (ast.NotIn,),
-    ast.NotIn: (ast.In,),
-    ast.Add: (ast.Sub,),
-    ast.Sub: (ast.Add,),
-    ast.Mult: (ast.Div,),
-    ast.Div: (ast.Mult,),
-    ast.And: (ast.Or,),
-    ast.Or: (ast.And,),
-}
-
-Edit = Callable[[], None]
-
-
-class Mutant(NamedTuple):
-    """One changed source."""
-
-    module: str
-    line: int
-    source: str
-
 
 class Outcome(NamedTuple):
     """What became of a mutant."""
@@ -98,129 +70,6 @@ class Outcome(NamedTuple):
     mutant: Mutant
     survived: bool
     seconds: float
-
-
-def _operators(node: ast.AST) -> Iterator[Edit]:
-    """Other operators."""
-
-    def put(index: int, other: type[ast.AST]) -> None:
-        if isinstance(node, ast.Compare):
-            node.ops[index] = other()  # type: ignore[call-overload]
-        else:
-            node.op = other()  # type: ignore[attr-defined]
-
-    found: list[ast.AST] = []
-    if isinstance(node, ast.Compare):
-        found = list(node.ops)
-    elif isinstance(node, (ast.BinOp, ast.BoolOp, ast.AugAssign)):
-        found = [node.op]
-    for index, operator in enumerate(found):
-        for other in _OPPOSITES.get(type(operator), ()):
-            yield lambda index=index, other=other: put(index, other)  # type: ignore[misc]
-
-
-def _values(node: ast.AST) -> Iterator[Edit]:
-    """Other constants, no sign, no ``not``, two arguments swapped."""
-    if isinstance(node, ast.Constant):
-        value = node.value
-        if isinstance(value, bool):
-            yield lambda: setattr(node, 'value', not value)
-        elif isinstance(value, int):
-            yield lambda: setattr(node, 'value', value + 1)
-        elif isinstance(value, float):
-            yield lambda: setattr(node, 'value', 1.2 * value if value else 0.1)
-    elif isinstance(node, ast.UnaryOp) and isinstance(node.op, (ast.USub, ast.Not)):
-        changed = ast.UAdd() if isinstance(node.op, ast.USub) else None
-        if changed:
-            yield lambda: setattr(node, 'op', changed)
-        else:
-            doubled = ast.UnaryOp(ast.Not(), node.operand)
-            yield lambda: setattr(node, 'operand', doubled)
-    elif isinstance(node, ast.Call) and _order_matters(node):
-        swapped = [node.args[1], node.args[0], *node.args[2:]]
-        yield lambda: setattr(node, 'args', swapped)
-
-
-def _order_matters(call: ast.Call) -> bool:
-    name = ast.unparse(call.func)
-    either = name.rsplit('.', 1)[-1] in ('min', 'max', 'minimum', 'maximum', 'hypot')
-    either |= name == 'np.clip'  # a value and its lower bound
-    return len(call.args) >= 2 and not either and ast.dump(call.args[0]) != ast.dump(call.args[1])
-
-
-def _dropped(node: ast.AST) -> Iterator[Edit]:
-    """Statements without which the function still runs."""
-    for name in ('body', 'orelse', 'finalbody'):
-        block = getattr(node, name, None)
-        if not isinstance(block, list) or isinstance(node, (ast.Module, ast.ClassDef)):
-            continue
-        for index, statement in enumerate(block):
-            leaves = isinstance(statement, (ast.AugAssign, ast.Raise, ast.If, ast.Expr)) or (
-                isinstance(statement, ast.Assign)
-                and not any(
-                    isinstance(part, ast.Name)
-                    for part in ast.walk(statement.targets[0])
-                    if isinstance(getattr(part, 'ctx', None), ast.Store)
-                )
-            )
-            documentation = isinstance(statement, ast.Expr) and isinstance(
-                statement.value, (ast.Constant, ast.Yield)
-            )
-            if leaves and not documentation:
-                yield lambda block=block, index=index: block.__setitem__(  # type: ignore[misc]
-                    index, ast.Pass()
-                )
-
-
-def _code(tree: ast.AST) -> Iterator[ast.AST]:
-    """Nodes of what runs, without annotations, defaults and messages: constants and functions."""
-    for node in ast.iter_child_nodes(tree):
-        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
-            yield node
-            for statement in node.body:
-                yield statement
-                yield from _inside(statement)
-        elif isinstance(node, ast.ClassDef):
-            yield from _code(node)
-        elif isinstance(node, (ast.Assign, ast.AnnAssign)) and node.value is not None:
-            yield node.value
-            yield from _inside(node.value)
-
-
-def _inside(node: ast.AST) -> Iterator[ast.AST]:
-    for name, field in ast.iter_fields(node):
-        if name in ('annotation', 'returns') or isinstance(node, ast.JoinedStr):
-            continue
-        if isinstance(node, ast.Call) and ast.unparse(node.func) == 'np.empty':
-            continue  # more room than is needed changes nothing
-        for child in field if isinstance(field, list) else [field]:
-            if isinstance(child, ast.AST):
-                yield child
-                yield from _inside(child)
-
-
-def _edits(module: str) -> tuple[ast.Module, list[tuple[int, Edit]]]:
-    """A module's tree, and all that can be changed in it, by line."""
-    tree = ast.parse(path_of(module, ROOT).read_text())
-    return tree, [
-        (getattr(node, 'lineno', 0), edit)
-        for node in _code(tree)
-        for find in (_operators, _values, _dropped)
-        for edit in find(node)
-    ]
-
-
-def _mutant(module: str, number: int) -> Mutant:
-    """The mutant with that number of a module."""
-    tree, edits = _edits(module)
-    line, edit = edits[number]
-    edit()
-    return Mutant(module, line, ast.unparse(ast.fix_missing_locations(tree)))
-
-
-def path_of(module: str, root: Path) -> Path:
-    """Where a module's source lies in a tree."""
-    return root.joinpath('src', module.split('.')[0], *module.split('.')).with_suffix('.py')
 
 
 def _imports(text: str) -> str:
@@ -246,11 +95,19 @@ def _standing_on(module: str) -> set[str]:
     return {name.rsplit('.', 1)[-1] for name in reached}
 
 
+def _kill(process: subprocess.Popen[bytes]) -> None:
+    """With those that it branched off."""
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+
+
 class Copy:
     """A copy of the tree, with compiled code and a ROS domain of its own."""
 
     def __init__(self, where: Path, domain: int) -> None:
         self.where = where
+        self.ended = False
+        self._running: subprocess.Popen[bytes] | None = None
         self._cache, self._warm = where / 'numba', where / 'warm'
         listed = subprocess.run(
             ['git', '-C', ROOT, 'ls-files', '-z', '--cached', '--others', '--exclude-standard'],
@@ -285,13 +142,19 @@ class Copy:
             stderr=subprocess.DEVNULL,
             start_new_session=True,
         ) as process:
+            self._running = process
             try:
-                return process.wait(limit) == 0
+                return not self.ended and process.wait(limit) == 0
             except subprocess.TimeoutExpired:
                 return False
             finally:
-                with contextlib.suppress(ProcessLookupError):  # with those that it branched off
-                    os.killpg(process.pid, signal.SIGKILL)
+                _kill(process)
+
+    def end(self) -> None:
+        """Test nothing any more: what is under way fails at once."""
+        self.ended = True
+        if self._running is not None:
+            _kill(self._running)
 
     def warm_up(self, tests: tuple[str, ...]) -> float:
         """Compile what the unchanged tests need; returns how long tests and compiler took [s].
@@ -332,17 +195,10 @@ class Copy:
         return Outcome(mutant, survived, time.monotonic() - begin)
 
 
-def difference(mutant: Mutant) -> str:
-    """The changed lines."""
-    plain = ast.unparse(ast.parse(path_of(mutant.module, ROOT).read_text()))
-    lines = difflib.unified_diff(plain.splitlines(), mutant.source.splitlines(), lineterm='', n=0)
-    return '\n'.join(line for line in list(lines)[2:] if not line.startswith('@@'))
-
-
 def run(modules: list[str], number: int, seed: int, jobs: int) -> list[Outcome]:
     """Judge ``number`` mutants, drawn evenly from all of the modules'."""
-    every = [(module, one) for module in modules for one in range(len(_edits(module)[1]))]
-    drawn = [_mutant(*one) for one in random.Random(seed).sample(every, min(number, len(every)))]
+    every = [(module, one) for module in modules for one in range(len(edits_of(module)[1]))]
+    drawn = [mutant_of(*one) for one in random.Random(seed).sample(every, min(number, len(every)))]
     print(f'{len(drawn)} of {len(every)} mutants of {len(modules)} modules', flush=True)
     stages = {stage for module in modules for stage in LOOKED_AT_BY[module]}
     with tempfile.TemporaryDirectory(prefix='maglev-mutants') as folder:
@@ -353,6 +209,8 @@ def run(modules: list[str], number: int, seed: int, jobs: int) -> list[Outcome]:
         def work(copy: Copy, share: list[Mutant]) -> None:
             for mutant in share:
                 outcome = copy.judge(mutant, 60.0 + 2.0 * took)
+                if copy.ended:
+                    return
                 outcomes.append(outcome)
                 if outcome.survived:
                     print(f'\nsurvived: {mutant.module}:{mutant.line}')
@@ -360,8 +218,13 @@ def run(modules: list[str], number: int, seed: int, jobs: int) -> list[Outcome]:
                 print(f'\r{len(outcomes)}/{len(drawn)}', end='', file=sys.stderr, flush=True)
 
         with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
-            took = max(pool.map(lambda copy: max(map(copy.warm_up, stages)), copies))
-            list(pool.map(work, copies, [drawn[job::jobs] for job in range(jobs)]))
+            try:
+                took = max(pool.map(lambda copy: max(map(copy.warm_up, stages)), copies))
+                list(pool.map(work, copies, [drawn[job::jobs] for job in range(jobs)]))
+            except KeyboardInterrupt:
+                print('\nmutants: interrupted', file=sys.stderr)
+                for copy in copies:
+                    copy.end()
     return outcomes
 
 
@@ -380,6 +243,8 @@ def main() -> int:
     parser.add_argument('--seed', type=int, default=1, metavar='S')
     parser.add_argument('--jobs', type=int, default=os.cpu_count() or 1, metavar='J')
     given = parser.parse_args()
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.default_int_handler)
     outcomes = run(given.modules, given.mutants, given.seed, given.jobs)
     print()
     for module in given.modules:

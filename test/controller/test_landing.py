@@ -44,6 +44,7 @@ def test_from_any_reference_smoothly_to_the_stop(
     assert np.abs(steps).max() < 1e-6
     push_by_push = np.diff(rate, axis=0) - 0.5e-3 * (rows[1:, 2] + rows[:-1, 2])
     assert np.abs(push_by_push).max() < 1e-4
+    assert np.abs(push_by_push[:, 0]).max() < 4e-6
     assert np.all(path >= LOWER - 1e-9)
     assert np.all(path <= UPPER + 1e-9)
     np.testing.assert_allclose(path[-1, [0, 3, 4]], [0.031, 0.0, 0.0], atol=1e-12)
@@ -105,6 +106,10 @@ def test_it_may_brake_on_the_lower_stop_itself_but_on_no_other() -> None:
     np.testing.assert_array_equal(rows[:, 0, 0], UPPER[0])
     off = 0.03 * (UPPER - LOWER)
     np.testing.assert_allclose(rows[-1, 0, 1:3], [UPPER[1] - off[1], LOWER[2] + off[2]])
+    stop[0] -= 1e-4
+    falling = way(stop, np.array([0.02, 0.0, 0.0, 0.0, 0.0]), np.zeros(5))
+    braked = round(PARAMETERS.landing.braking_time / PARAMETERS.sample_time)
+    assert falling[braked, 0, 0] == pytest.approx(UPPER[0], abs=1e-12)
 
 
 def test_it_brakes_over_half_of_what_its_speed_would_cover() -> None:

@@ -1,0 +1,197 @@
+#!/usr/bin/env python3
+"""Which small changes of a module do its own tests let through?
+
+    python benchmarks/unit_mutants.py [--modules NAME...] [--jobs J]
+
+All mutants of the modules that have such tests, a second or three each: a process that has imported
+the libraries branches off for every mutant and runs the tests with it, compiled code as plain
+Python. What survives may still be noticed by the tests that fly, see mutants.py. The exit code is 1
+when more than a twentieth survive.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import importlib
+import importlib.abc
+import importlib.machinery
+import importlib.util
+import os
+import signal
+import sys
+import time
+from types import ModuleType
+from typing import NamedTuple
+
+from mutation import ROOT, Mutant, difference, edits_of, mutant_of, path_of
+
+ALLOWED = 0.05
+_LIBRARIES = ('numpy', 'scipy.integrate', 'scipy.linalg', 'scipy.signal', 'scipy.optimize')
+_TOOLS = ('pytest', 'hypothesis.strategies', 'hypothesis.extra.pytestplugin', 'yaml', 'control')
+
+_BRIDGE = 'test/hw_bridge/test_'
+TESTS: dict[str, tuple[str, ...]] = {
+    'maglev_model.inverse': (
+        *(f'test/model/test_{name}.py' for name in ('inverse', 'attraction_shares')),
+        'test/model/test_single_motor_inverse.py',
+    ),
+    'maglev_model.controller_watch': ('test/model/test_controller_watch.py',),
+    'maglev_controller.landing': ('test/controller/test_landing.py',),
+    'maglev_hw_bridge.amplifiers': (f'{_BRIDGE}amplifiers.py',),
+    'maglev_hw_bridge.encoders': (f'{_BRIDGE}encoders.py',),
+    'maglev_hw_bridge.observer': (f'{_BRIDGE}observer.py', f'{_BRIDGE}guard.py'),
+    'maglev_hw_bridge.leaps': (f'{_BRIDGE}leaps.py',),
+    'maglev_hw_bridge.standing_still': tuple(
+        f'{_BRIDGE}{name}.py' for name in ('doubts', 'roll_call', 'standing_still')
+    ),
+    'maglev_hw_bridge.guard': (f'{_BRIDGE}watch.py', f'{_BRIDGE}guard.py'),
+    'maglev_hw_bridge.landing': (f'{_BRIDGE}way_down.py',),
+}
+"""Modules, and their own tests, which do not fly."""
+
+_PATIENCE = 60.0  # with the tests of a mutant [s]
+
+
+class _Changed(importlib.abc.MetaPathFinder, importlib.abc.Loader):
+    """Imports a mutant for its module."""
+
+    def __init__(self, mutant: Mutant) -> None:
+        self._mutant, self._path = mutant, str(path_of(mutant.module, ROOT))
+
+    def find_spec(
+        self, name: str, path: object, target: ModuleType | None = None
+    ) -> importlib.machinery.ModuleSpec | None:
+        if name != self._mutant.module:
+            return None
+        return importlib.util.spec_from_loader(name, self, origin=self._path)
+
+    def exec_module(self, module: ModuleType) -> None:
+        module.__file__ = self._path
+        exec(compile(self._mutant.source, self._path, 'exec'), module.__dict__)
+
+
+def _interpret() -> None:
+    """Leave compiled functions as they are written, and let records have attributes there too."""
+    import numpy as np
+
+    from maglev_model import ahead
+    from maglev_model.records import Record
+
+    ahead.stand_in_by(lambda function, make: function)
+    hold = Record._hold
+    Record._hold = lambda self, block: hold(self, block.view(np.recarray))  # type: ignore
+
+
+def _test(module: str, mutant: Mutant | None) -> None:
+    """In a child: run the tests, and leave with their code."""
+    os.setsid()
+    silence = os.open(os.devnull, os.O_RDWR)
+    for stream in range(3):
+        os.dup2(silence, stream)
+    if mutant is not None:
+        sys.meta_path.insert(0, _Changed(mutant))
+    code = 1
+    try:
+        import pytest
+
+        _interpret()
+        options = ('-q', '-x', '-W', 'ignore::RuntimeWarning', '-p', 'no:cacheprovider')
+        code = int(pytest.main([*options, '-p', 'hypothesispytest', *TESTS[module]]))
+    finally:
+        os._exit(code)
+
+
+class Child(NamedTuple):
+    """The tests of a mutant, under way."""
+
+    mutant: Mutant | None
+    until: float
+
+
+def _branch(module: str, mutant: Mutant | None, running: dict[int, Child]) -> None:
+    pid = os.fork()
+    if pid == 0:
+        _test(module, mutant)
+    running[pid] = Child(mutant, time.monotonic() + _PATIENCE)
+
+
+def _next(running: dict[int, Child]) -> tuple[Child, bool]:
+    """Wait for the next that ends, or lasts too long; whether its tests passed."""
+    while True:
+        pid, status = os.waitpid(-1, os.WNOHANG)
+        if pid in running:
+            _kill(pid)
+            return running.pop(pid), status == 0
+        for late, child in running.items():
+            if time.monotonic() > child.until:
+                _kill(late)
+        time.sleep(0.01)
+
+
+def _kill(group: int) -> None:
+    with contextlib.suppress(ProcessLookupError):  # with those that it branched off
+        os.killpg(group, signal.SIGKILL)
+
+
+def judge(module: str, jobs: int) -> tuple[int, int]:
+    """Mutants of a module that survived, and all. Raises SystemExit when its own tests fail."""
+    running: dict[int, Child] = {}
+    _branch(module, None, running)
+    if not _next(running)[1]:
+        sys.exit(f'unit_mutants: without any change these tests fail: {" ".join(TESTS[module])}')
+    mutants = [mutant_of(module, number) for number in range(len(edits_of(module)[1]))]
+    waiting = [mutant for mutant in mutants if difference(mutant)]
+    number, survived = len(waiting), 0
+    try:
+        while waiting or running:
+            while waiting and len(running) < jobs:
+                _branch(module, waiting.pop(0), running)
+            child, passed = _next(running)
+            if passed and child.mutant is not None:
+                survived += 1
+                print(f'\nsurvived: {module}:{child.mutant.line}\n{difference(child.mutant)}')
+            done = number - len(waiting) - len(running)
+            print(f'\r{module} {done}/{number}', end='', file=sys.stderr, flush=True)
+    finally:
+        for pid in running:
+            _kill(pid)
+    return survived, number
+
+
+def main() -> int:
+    """Entry point."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else '')
+    parser.add_argument(
+        '--modules',
+        nargs='+',
+        choices=sorted(TESTS),
+        metavar='NAME',
+        default=sorted(TESTS),
+        help='default: all that have tests of their own',
+    )
+    parser.add_argument('--jobs', type=int, default=os.cpu_count() or 1, metavar='J')
+    given = parser.parse_args()
+    for caught in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(caught, signal.default_int_handler)
+    os.chdir(ROOT)
+    for library in (*_LIBRARIES, *_TOOLS):
+        try:
+            importlib.import_module(library)
+        except ModuleNotFoundError:
+            continue  # only speed depends on it
+    survived = every = 0
+    try:
+        for module in given.modules:
+            lived, number = judge(module, given.jobs)
+            print(f'\n{module:40} {number:4} mutants, {lived:3} survived', flush=True)
+            survived, every = survived + lived, every + number
+    except KeyboardInterrupt:
+        print('\nunit_mutants: interrupted', file=sys.stderr)
+        return 130
+    print(f'{survived} of {every} survived: {100 * survived / every:.1f} %')
+    return int(survived > ALLOWED * every)
+
+
+if __name__ == '__main__':
+    sys.exit(main())
