@@ -92,3 +92,18 @@ def test_gaps_that_contradict_each_other_since_one_or_two_counted(
     assert doubts(watched) == ((CONTRADICTED, list(which)) if known else (0, []))
     watched.probation[3] = 1  # no rigid platen any more: no contradiction
     assert doubts(watched) == (0, [])
+
+
+def test_what_has_contradicted_itself_since_before_its_count_says_nothing_new() -> None:
+    """A machine whose guides are bent does so all the time."""
+    watched = hovering()
+    watched.believed[0] = watched.length[0] = 0.025 + 1e-4
+    watched.residual_then[:] = 1e-4
+    assert doubts(watched) == (0, [])
+
+
+def test_of_two_gaps_nothing_can_be_contradicted() -> None:
+    watched = hovering()
+    watched.trust[:2] = LOST
+    watched.residual_then[:] = 1.0
+    assert doubts(watched) == (0, [])

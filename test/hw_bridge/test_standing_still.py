@@ -183,6 +183,14 @@ def test_of_gaps_that_contradict_each_other_half_of_that_is_enough(share: float)
     assert bool(watched.trust[1] == LOST) is (share > 0.5)
 
 
+@pytest.mark.parametrize('encoder', [4, 5])
+def test_x_and_z_are_stuck_by_what_they_should_have_moved_whatever_gaps_say(encoder: int) -> None:
+    watched = hovering()
+    watched.unseen[encoder] = 1.01 * watched_limit(encoder)
+    assert find_stuck(watched.block[0], np.arange(6) == encoder, CONTRADICTED)
+    assert watched.trust[encoder] == LOST
+
+
 def test_one_that_leapt_and_is_doubted_is_done_without_too() -> None:
     watched = hovering()
     watched.blamed[2] = watched.blamed[3] = 1
@@ -238,6 +246,8 @@ def test_five_counts_one_way_bring_it_back(
     assert returned == [False] * (len(counts) - 1) + [comes]
     assert watched.trust[encoder] == (PUT_RIGHT if comes else LOST)
     assert watched.stood[encoder - 4] == int(not comes)
+    listen(watched.block[0])
+    assert not watched.returned
     if comes:
         before = watched.believed[encoder] - 1e-5 * way * counts[-1]
         assert watched.past[:, encoder] == pytest.approx(before)
