@@ -56,12 +56,13 @@ def test_after_its_probation_it_is_where_friction_may_have_let_it_or_lost(
     encoder: int, way: float
 ) -> None:
     """In 20 samples friction, of the tilts too, moves it so far off what the model foretells."""
-    friction = PARAMETERS.fault.friction
+    friction = (0.8, 0.35, 0.4, 3.0, 5.0)
     tilt = PARAMETERS.machine.radius * friction[3 + encoder % 2]
     held = friction[0] + tilt if encoder < 4 else friction[encoder - 3]
     drift = 0.5 * held * (20 * T) ** 2
     for share, left in ((0.99, PUT_RIGHT), (1.01, LOST)):
         hover = Hover()
+        hover.watched.friction[:] = friction
         hover.length[encoder] += 3e-4
         hover.sample()
         creep = way * share * (JUMP + drift) / 19

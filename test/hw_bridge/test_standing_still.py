@@ -284,3 +284,13 @@ def test_what_no_encoder_shows_moves_as_the_model_alone_says(
     expected = np.array([alone, doubted[4], doubted[5], alone, alone])
     np.testing.assert_array_equal(watched.rate, np.where(expected, 2.0, 1.0))
     np.testing.assert_array_equal(watched.disturbance, np.where(expected, 4.0, 3.0))
+
+
+@pytest.mark.parametrize('one', range(4))
+def test_one_gap_is_enough_to_doubt_y_and_one_to_show_it(one: int) -> None:
+    gap, none = np.arange(6) == one, np.zeros(6, bool)
+    for doubted, used, alone in ((gap, none, True), (~gap, gap, False), (none, none, False)):
+        watched = hovering()
+        watched.model_rate[:] = 2.0
+        follow_model(watched.block[0], doubted, used)
+        assert bool(watched.rate[Y] == 2.0) is alone
