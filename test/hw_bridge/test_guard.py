@@ -93,6 +93,22 @@ def test_what_begins_where_no_platen_can_be_has_lost_its_count(encoder: int, awa
     assert judge.failed == [encoder]
 
 
+@pytest.mark.parametrize('encoder', range(6))
+@pytest.mark.parametrize(('beyond', 'possible'), [(9.9e-3, True), (10.1e-3, False)])
+def test_a_centimetre_beyond_its_stop_it_may_be_tilts_and_all(
+    encoder: int, beyond: float, possible: bool
+) -> None:
+    judge, machine = guard.Guard(PARAMETERS), PARAMETERS.machine
+    length = np.array([0.025, 0.025, 0.025, 0.025, 0.0, 0.0])
+    axis = 0 if encoder < 4 else encoder - 3
+    for end, way in ((machine.lower_limit[axis], -1.0), (machine.upper_limit[axis], 1.0)):
+        judge.trust()
+        there = length.copy()
+        there[encoder] = end + way * beyond
+        judge.watch(there, np.zeros(12), False)
+        assert judge.failed == ([] if possible else [encoder])
+
+
 def test_what_makes_no_place_at_all_is_begun_anew_until_it_does() -> None:
     """Gaps that differ by more than the platen is long give no tilt."""
     judge, length = guard.Guard(PARAMETERS), np.array([0.025, 0.025, 0.025, 0.025, 0.0, 0.0])

@@ -91,6 +91,25 @@ def test_gaps_that_creep_apart_contradict_each_other_from_the_second_sample(
     assert hover.sample()[0] == guard.FINE
 
 
+@pytest.mark.parametrize('gone', [4, 5])
+def test_for_that_x_and_z_need_not_be_believed(gone: int) -> None:
+    hover = Hover()
+    hover.judge.lose(gone)
+    hover.watched.contradictions = 1
+    hover.watched.max_residual = -1.0
+    assert hover.sample() == (guard.RESIDUAL, 0)
+
+
+@pytest.mark.parametrize('encoder', range(4))
+def test_nor_is_a_gap_believed_up_to_the_last_sample_of_its_probation(encoder: int) -> None:
+    hover = Hover()
+    hover.watched.max_residual = -1.0
+    for left, code in ((3, guard.FINE), (2, guard.FINE), (1, guard.RESIDUAL)):
+        hover.watched.probation[encoder] = left
+        hover.watched.contradictions = 1
+        assert hover.sample()[0] == code
+
+
 @pytest.mark.parametrize('encoder', range(6))
 def test_one_that_slips_is_blamed_put_right_and_believed_on(encoder: int) -> None:
     hover = Hover()
