@@ -171,7 +171,7 @@ def test_from_the_third_sample_on_a_leap_is_seen_aloft_and_on_the_stop_from_the_
         for slips, code in ((1, second), (2, guard.JUMP)):
             judge, length = guard.Guard(PARAMETERS), np.array([y, y, y, y, 0.0, 0.0])
             for number in range(slips + 1):
-                judge.arrays.step[:] = 1.0 if number == 1 else judge.arrays.step
+                judge.arrays.step[:] = 2e-4 if number == 1 else judge.arrays.step
                 length[5] += 2e-4 if number == slips else 0.0
                 found, index = judge.watch(length, np.zeros(12), False)
             assert (found, index) == (code, 5 if code == guard.JUMP else 0)
