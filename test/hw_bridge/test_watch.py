@@ -8,7 +8,9 @@ from hovering import PARAMETERS, Hover
 
 from maglev_hw_bridge import guard
 from maglev_hw_bridge.guard_arrays import LOST, PUT_RIGHT, SOUND
+from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_model.axes import AXES, X, Y
+from maglev_model.parameters import build
 
 
 def test_what_may_come_of_a_sample_is_told_apart() -> None:
@@ -21,6 +23,9 @@ def test_what_may_come_of_a_sample_is_told_apart() -> None:
 def test_out_of_its_soft_range_it_is_named_in_flight(axis: int, side: str) -> None:
     hover = Hover()
     bound = getattr(hover.watched, side)
+    bound[X] = 0.0  # which is where it is
+    assert hover.sample() == (guard.FINE, 0)
+    bound[X] = PARAMETERS.fault.lower[X] if side == 'soft_lower' else PARAMETERS.fault.upper[X]
     out = 1e-9 if side == 'soft_lower' else -1e-9
     bound[axis] = hover.watched.position[axis] - out
     assert hover.sample() == (guard.FINE, 0)
@@ -34,8 +39,9 @@ def test_a_gap_out_of_its_range_is_named_in_flight(side: str, gap: int) -> None:
     """Tilted by 1 mrad the first is the least, the third the largest."""
     hover = Hover(phi=1e-3)
     out = 1e-9 if side == 'gap_lower' else -1e-9
-    setattr(hover.watched, side, hover.length[gap] - out)
-    assert hover.sample() == (guard.FINE, 0)
+    for still in (hover.length[gap] - out, hover.length[gap]):
+        setattr(hover.watched, side, still)
+        assert hover.sample() == (guard.FINE, 0)
     setattr(hover.watched, side, hover.length[gap] + out)
     assert hover.sample(flying=False) == (guard.FINE, 0)
     assert hover.sample() == (guard.GAP_RANGE, gap)
@@ -201,6 +207,11 @@ def test_read_at_once_but_late_an_encoder_has_moved_on(behind: int) -> None:
         np.testing.assert_allclose(hover.watched.believed[4:], step * number, atol=1e-6)
 
 
+def test_who_is_read_at_once_is_on_the_second_board() -> None:
+    parameters = build(BridgeParameters, {'encoder.board': (0, 1, 0, 1, 1, 0)})
+    assert guard.Guard(parameters).arrays.at_once.tolist() == [0.0, 1.0, 0.0, 1.0, 1.0, 0.0]
+
+
 def test_before_it_knows_how_fast_they_move_what_is_late_is_taken_as_read() -> None:
     judge, length = guard.Guard(PARAMETERS), np.array([0.025, 0.025, 0.025, 0.025, 0.0, 0.0])
     judge.arrays.at_once[:], judge.arrays.step[:] = 1.0, 1e-3
@@ -246,6 +257,9 @@ def test_homed_anew_every_encoder_is_believed_and_its_past_forgotten() -> None:
         ((0, 1, 2, 3), ('y', 'phi', 'theta')),
         ((4,), ('x',)),
         ((5,), ('z',)),
+        ((0, 4), ('x',)),
+        ((1, 4), ('x',)),
+        ((2, 3, 4, 5), ('x', 'z', 'phi')),
     ],
 )
 def test_which_axes_nothing_shows(lost: tuple[int, ...], blind: tuple[str, ...]) -> None:
