@@ -113,7 +113,7 @@ def test_it_is_over_after_braking_descent_and_settling(seen: bool) -> None:
     total = sum(times(blind)) + LAW.settle_time
     for off, over in ((-1.5, False), (0.5, True)):
         landing.arrays.elapsed = total + off * T
-        assert landing.step(PLACE, np.zeros(5), np.zeros(5)) is over
+        assert bool(landing.step(PLACE, np.zeros(5), np.zeros(5))) is over
 
 
 @pytest.mark.parametrize('axis', range(5))
