@@ -218,6 +218,8 @@ def test_on_the_lower_stop_its_support_is_no_disturbance() -> None:
     ('rate', 'acceleration', 'rests'),
     [
         (0.001, -0.2, False),  # it has not turned round
+        (-0.001, -0.2, False),
+        (0.001, 0.2, False),
         (-0.0001, -0.2, True),
         (0.0001, 0.2, True),
         (0.0, -0.2, True),
