@@ -111,8 +111,8 @@ def test_the_model_alone_moves_what_friction_and_stops_let_go(
     holds += np.clip(np.sign(gained) * then, 0.0, FRICTION)
     left = np.abs(gained) - holds * (time + T)
     if seated:
-        left[[PHI, THETA]] = -np.inf
-        left[Y] = left[Y] if gained[Y] < 0.0 else -np.inf
+        left[[PHI, THETA]] = -1.0
+        left[Y] = left[Y] if gained[Y] < 0.0 else -1.0
     goes = left > 0.0
     if np.any(np.abs(left) < 1e-9):
         return
