@@ -87,6 +87,7 @@ def test_it_is_homed_where_it_was_read_last_wherever_the_counters_stand(counter:
     unit.home(readings)
     home = [0.031] * 4 + [-0.05] * 2
     assert unit.arrays.length == pytest.approx(home, abs=1e-12)
+    assert unit.home(readings) == pytest.approx([0.0] * 6, abs=1e-9)
     for away in (-30, 30):
         moved = unit.decode(as_counts([counter + 1 + away] * 6)) - home
         assert moved == pytest.approx(away * unit.arrays.scale, abs=1e-11)
