@@ -82,19 +82,21 @@ def test_the_references_ring_may_begin_anew_in_flight() -> None:
 @pytest.mark.parametrize('end', ['given up', 'waiting', 'restarted', 'landed'])
 def test_however_it_ends_no_current_is_left(end: str) -> None:
     supervisor = flying()
-    step(supervisor, 2, Phase.TRACK, ASIDE, 0.025)
+    for sequence in range(2, 50):
+        step(supervisor, sequence, Phase.TRACK, HOVER, 0.025)
+    step(supervisor, 50, Phase.TRACK, ASIDE, 0.025)
     assert supervisor.direct_current.all()
     assert supervisor.quadrature_current[[1, 3]].all()
     assert supervisor.limited_by
     if end == 'given up':
         supervisor.give_up('a defect')
     if end == 'waiting':
-        step(supervisor, 3, Phase.END, STOP, 0.031)
+        step(supervisor, 51, Phase.END, STOP, 0.031)
     if end == 'restarted':
         supervisor.restart()
     if end == 'landed':
         supervisor.disable()
-        for sequence in range(3, 1000):
+        for sequence in range(51, 1000):
             if step(supervisor, sequence, Phase.TRACK, HOVER, 0.0252) != Mode.LANDING:
                 break
         assert supervisor.mode == Mode.DISABLED
