@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -184,3 +185,53 @@ def test_each_status_has_a_number_that_stays() -> None:
         ('FLYING', 1),
         ('GAVE_UP', 2),
     ]
+
+
+def flying() -> Flight:
+    """Follows controller 1, whose newest command answers the newest sample."""
+    flight = Flight()
+    for message in (REST, Message(), Message()):
+        flight.sample += 1
+        assert flight.hear(message) is Verdict.FOLLOWED
+    assert flight.flying
+    return flight
+
+
+@pytest.mark.parametrize(
+    ('message', 'why'),
+    [
+        (Message(session=2), 'from somebody else'),
+        (Message(session=NOBODY), 'from somebody else'),
+        (Message(status=Status.GAVE_UP), 'the controller gave up'),
+        (Message(status=7), 'with status 7'),
+        (Message(age=-1), 'still to come'),
+        (Message(age=1), 'after those for sample'),
+        (Message(age=2), 'after those for sample'),
+        (Message(stamped=False), 'the stamp of another measurement'),
+        (Message(status=Status.RESTING), 'says it rests'),
+    ],
+)
+def test_in_flight_what_is_not_followed_is_refused_and_nobody_is_taken_up(
+    message: Message, why: str
+) -> None:
+    flight = flying()
+    flight.sample += 1 if message.age <= 0 else 0
+    assert flight.hear(message) is Verdict.REFUSED
+    assert why in flight.watch.why
+    assert flight.watch.gave_up == (message.status == Status.GAVE_UP)
+    assert not flight.watch.taken_up
+    flight.sample += 1
+    for again in (Message(), REST, message):
+        assert flight.hear(again) is Verdict.IGNORED  # until it has come to rest
+    flight.land()
+    flight.sample += 1
+    assert flight.hear(REST) is Verdict.FOLLOWED
+
+
+def test_in_flight_its_controller_is_followed_from_sample_to_sample() -> None:
+    flight = flying()
+    for _ in range(3):
+        flight.sample += 2
+        assert flight.hear(Message(age=1)) is Verdict.FOLLOWED
+        assert flight.hear(Message(age=0)) is Verdict.FOLLOWED
+        assert flight.watch.newest == flight.sample
