@@ -172,7 +172,7 @@ def test_before_any_command_nobody_is_followed_blamed_or_has_given_up() -> None:
 
 def test_the_very_first_sample_may_be_answered_and_a_stage_may_begin_anew() -> None:
     flight = Flight()
-    for beginning in (5, 0):
+    for beginning in (0, 5, 0):
         flight.sample = beginning
         assert flight.hear(REST) is Verdict.FOLLOWED
         flight.watch.forget()
@@ -235,3 +235,9 @@ def test_in_flight_its_controller_is_followed_from_sample_to_sample() -> None:
         assert flight.hear(Message(age=1)) is Verdict.FOLLOWED
         assert flight.hear(Message(age=0)) is Verdict.FOLLOWED
         assert flight.watch.newest == flight.sample
+
+
+def test_in_flight_one_sample_is_answered_once() -> None:
+    flight = flying()
+    assert flight.hear(Message()) is Verdict.REFUSED
+    assert 'after those for sample' in flight.watch.why
