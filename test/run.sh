@@ -122,7 +122,8 @@ else
   asked=${MAGLEV_LONG:+ or long}
   run_pytest -p xdist -n 4 --dist loadfile --no-loadscope-reorder \
     -m "not alone and (not long$asked)" || code=$?
-  run_pytest -m "alone and (not long$asked)" test/graph test/model test/scenario test/study || code=$?
+  mapfile -t alone < <(grep -rlF mark.alone --include='test_*.py' test)
+  run_pytest -m "alone and (not long$asked)" "${alone[@]}" || code=$?
 fi
 style=passed
 wait "$style_job" || style=failed
