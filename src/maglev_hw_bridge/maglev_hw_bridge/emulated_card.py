@@ -131,7 +131,8 @@ class EmulatedCard:
     def read_digital(self, channels: Any, n: int, values: Any) -> None:
         """Digital lines, int8."""
         self._check()
-        _memory(values, np.int8, n)[:] = self._lines.levels[_channels(channels, n, LINES)]
+        which = _channels(channels, n, LINES).tolist()
+        _memory(values, np.int8, n)[:] = [self._lines.level(line) for line in which]
 
     def write_digital(self, channels: Any, n: int, values: Any) -> None:
         """Digital lines, int8."""

@@ -46,15 +46,13 @@ class Lines:
         """An expired watchdog lets go of all lines; cleared, they are driven as before."""
         self._let_go = expired
 
-    @property
-    def levels(self) -> NDArray[np.int8]:
-        """Of all lines, (32,)."""
-        levels = np.full(LINES, _PULLED_UP, dtype=np.int8)
-        if self._stop >= 0 and self.stop_plugged:
-            levels[self._stop] = self._stop_level if self.stop_pressed else 1 - self._stop_level
-        if not self._let_go:
-            levels[self._output] = self._written[self._output]
-        return levels
+    def level(self, line: int) -> int:
+        """Of one line."""
+        if self._output[line] and not self._let_go:
+            return int(self._written[line])
+        if line == self._stop and self.stop_plugged:
+            return self._stop_level if self.stop_pressed else 1 - self._stop_level
+        return _PULLED_UP
 
     @property
     def enabled(self) -> bool:
