@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from bridge_flight import OMEGA, Flight, ellipse, hover
 
-from maglev_hw_bridge.landing import Landing, impact_of_cut, impacts_of_cut
+from maglev_hw_bridge.landing import impact_of_cut, impacts_of_cut
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.stage import Mode
 from maglev_model.currents import exact_currents
 from maglev_model.inverse import CurrentLimits
 from maglev_model.machine import machine_constants
 from maglev_model.motor import vertical_force
-from maglev_model.platen import output_accelerations
 
 SOFT = 0.05  # [m/s]
 HEIGHTS = [0.0185, 0.020, 0.0225, 0.025, 0.0285, 0.030, 0.0308]
@@ -103,26 +102,6 @@ def test_a_cut_strikes_the_stop_as_foretold(y: float) -> None:
         assert struck > SOFT  # a cut is no landing
 
 
-@pytest.mark.parametrize(
-    ('y', 'speed', 'stops'),
-    [
-        (0.025, 0.0, ['upper']),
-        (0.0265, 0.0, ['upper']),
-        (0.0265, 0.03, ['upper', 'lower']),
-        (0.0283, 0.0, ['upper', 'lower']),
-        (0.0291, 0.0, ['upper', 'lower']),
-        (0.0308, 0.0, ['lower']),
-        (0.0308, -0.08, ['upper', 'lower']),
-    ],
-)
-def test_near_the_balance_a_cut_may_end_at_either_stop(
-    y: float, speed: float, stops: list[str]
-) -> None:
-    foretold = impacts_of_cut(BridgeParameters(), y, speed)
-    assert list(foretold) == stops
-    assert sorted(foretold.values(), reverse=True) == list(foretold.values())
-
-
 @pytest.mark.parametrize('pull', [0.92, 1.0, 1.08])
 @pytest.mark.parametrize('y', [0.0278, 0.0287, 0.0296])
 def test_a_cut_near_the_balance_is_no_harder_than_foretold(y: float, pull: float) -> None:
@@ -130,21 +109,6 @@ def test_a_cut_near_the_balance_is_no_harder_than_foretold(y: float, pull: float
     flight = fly(hover(y), 400, **machine)
     foretold = impacts_of_cut(flight.stage.parameters, *flight.rig.state[:2])
     assert impact_when_cut(flight) <= 1.15 * max(foretold.values()) + 0.03
-
-
-@pytest.mark.parametrize('speed', [np.nan, np.inf, -5.5, -0.75, 0.75])
-def test_a_speed_that_no_platen_has_is_not_foretold(speed: float) -> None:
-    parameters = BridgeParameters()
-    assert impacts_of_cut(parameters, 0.025, speed) == impacts_of_cut(parameters, 0.025, np.nan)
-    assert max(impacts_of_cut(parameters, 0.025, speed).values()) < 0.6
-    assert max(impacts_of_cut(parameters, 0.025, 0.9 * 0.75).values()) > 0.65
-
-
-def test_where_nobody_knows_the_place_a_cut_is_foretold_from_midway_between_the_stops() -> None:
-    parameters = BridgeParameters()
-    for speed in (0.0, 0.1, np.nan):
-        foretold = impacts_of_cut(parameters, np.nan, speed)
-        assert foretold == impacts_of_cut(parameters, 0.0245, speed)
 
 
 def test_a_cut_on_the_ellipse_is_far_from_soft() -> None:
@@ -172,15 +136,6 @@ def test_no_motor_gets_more_than_the_limit_while_it_lands() -> None:
     assert 0.199 < largest <= 0.2 * (1.0 + 1e-9)
 
 
-def test_rising_it_brakes_sooner_than_falling() -> None:
-    landing = Landing(BridgeParameters())
-    middle = np.array([0.0245, 0.0, 0.0, 0.0, 0.0])
-    for speed, time in ((-0.01, 0.1), (0.01, 0.3)):
-        landing.begin(middle, np.array([speed, 0.0, 0.0, 0.0, 0.0]))
-        assert landing.arrays.braking[0] == pytest.approx(time)
-        assert landing.arrays.level[0] == pytest.approx(middle[0] + 0.5 * time * speed)
-
-
 def test_it_presses_on_the_stop_for_the_settling_time() -> None:
     flight = fly(hover(0.03), 250)
     flight.stage.land('test')
@@ -189,129 +144,6 @@ def test_it_presses_on_the_stop_for_the_settling_time() -> None:
     assert flight.stage.mode is Mode.LANDING
     flight.run(3, controlled=False)
     assert flight.stage.mode is Mode.DISABLED
-
-
-@pytest.mark.parametrize(
-    ('blind', 'carrying'),
-    [(1, (1, 3)), (2, (0, 2)), (3, (1, 3)), (4, (0, 2))],
-)
-def test_what_is_not_seen_decides_which_motors_carry(blind: int, carrying: tuple[int, int]) -> None:
-    landing = Landing(BridgeParameters())
-    place, unseen = np.array([0.025, 0.0, 0.0, 0.0, 0.0]), np.zeros(5, np.bool_)
-    unseen[blind] = True
-    landing.begin(place, np.zeros(5), unseen)
-    landing.step(place, np.zeros(5), np.zeros(5))
-    machine = machine_constants(BridgeParameters().machine)
-    pull = [-vertical_force(machine, 0.025, i, 0.0) for i in landing.direct_current]
-    assert sum(pull) == pytest.approx(machine.M_y * machine.G, rel=1e-3)
-    assert sum(pull[i] for i in carrying) > 0.9 * sum(pull)
-    assert landing.arrays.descent_start + landing.arrays.descent_time < 0.5
-
-
-def pushed(position: np.ndarray, rate: np.ndarray, push: np.ndarray) -> np.ndarray:
-    """Accelerations y, x, z that a landing begun at 25 mm makes there, one sample later."""
-    landing = Landing(BridgeParameters())
-    landing.begin(PLACE, np.zeros(5))
-    landing.step(PLACE + position, rate, push)
-    return np.array(
-        output_accelerations(
-            machine_constants(BridgeParameters().machine),
-            PLACE[0] + position[0],
-            0.0,
-            0.0,
-            landing.direct_current,
-            landing.quadrature_current,
-        )[:3]
-    )
-
-
-PLACE = np.array([0.025, 0.0, 0.0, 0.0, 0.0])
-
-
-@pytest.mark.parametrize(
-    ('blind', 'over'),
-    [({1}, True), ({2}, True), ({1, 3}, True), ({1, 2, 4}, False), ({3}, False), (set(), False)],
-)
-def test_unseen_along_x_or_z_it_is_over_on_the_stop_itself(blind: set[int], over: bool) -> None:
-    """Not with theta unknown too: the mean gap is there while the platen stands on an edge."""
-    parameters = BridgeParameters()
-    landing, position = Landing(parameters), np.array([0.025, 0.0, 0.0, 0.0, 0.0])
-    landing.begin(position, np.zeros(5), np.isin(np.arange(5), list(blind)))
-    position[0] = parameters.machine.gap_max - 6e-5
-    assert not landing.step(position, np.zeros(5), np.zeros(5))
-    position[0] = parameters.machine.gap_max - 4e-5
-    assert landing.step(position, np.zeros(5), np.zeros(5)) is over
-
-
-def test_what_the_model_does_not_explain_is_made_up_for_along_y_alone() -> None:
-    made = pushed(np.zeros(5), np.zeros(5), np.array([1.5, 0.2, 0.2, 0.0, 0.0]))
-    assert made == pytest.approx((-1.5, 0.0, 0.0), abs=0.01)
-
-
-@pytest.mark.parametrize('axis', [1, 2])
-@pytest.mark.parametrize(
-    ('off', 'speed', 'wanted'),
-    [(1.9e-5, 0.0, 0.0), (2.1e-5, 0.0, -0.0525), (0.0, 1.9e-3, 0.0), (0.0, 2.1e-3, -0.21)],
-)
-def test_x_and_z_that_stand_still_are_not_pushed(
-    axis: int, off: float, speed: float, wanted: float
-) -> None:
-    unit = np.eye(5)[axis]
-    made = pushed(off * unit, speed * unit, np.zeros(5))
-    assert made[axis] == pytest.approx(wanted, abs=1e-6)
-
-
-@pytest.mark.parametrize('axis', [1, 2])
-@pytest.mark.parametrize(('speed', 'braked'), [(1.9e-3, 0.0), (2.1e-3, 3.15e-4)])
-def test_what_hardly_moves_along_x_or_z_is_not_braked(
-    axis: int, speed: float, braked: float
-) -> None:
-    landing = Landing(BridgeParameters())
-    landing.begin(PLACE, speed * np.eye(5)[axis])
-    assert landing.arrays.level[axis] == pytest.approx(braked)
-
-
-@pytest.mark.parametrize('axis', range(5))
-@pytest.mark.parametrize('share', [-0.99, -1.01, 0.99, 1.01])
-@pytest.mark.parametrize(('y', 'patience'), [(0.0286, 2.0), (0.0288, 1.0)])
-def test_a_platen_that_is_not_held_on_its_way_is_noticed(
-    axis: int, share: float, y: float, patience: float
-) -> None:
-    """Along x and z later where the magnets would pull it up when let go, above 28.7 mm."""
-    landing = Landing(BridgeParameters())
-    place = np.array([y, 0.0, 0.0, 0.0, 0.0])
-    landing.begin(place, np.zeros(5))
-    bound = (1e-3, 1e-3 * patience, 1e-3 * patience, 1.5e-3, 3e-3)[axis]
-    landing.step(place + share * bound * np.eye(5)[axis], np.zeros(5), np.zeros(5))
-    assert landing.astray == (abs(share) > 1.0)
-    landing.begin(place, np.zeros(5))
-    assert not landing.astray
-
-
-@pytest.mark.parametrize('axis', [3, 4])
-@pytest.mark.parametrize(('y', 'share'), [(0.0250, 0.95), (0.0295, 0.5)])
-def test_a_tilt_may_take_more_of_the_attraction_where_a_cut_would_throw_it_up(
-    axis: int, y: float, share: float
-) -> None:
-    parameters = BridgeParameters()
-    landing, machine = Landing(parameters), machine_constants(parameters.machine)
-    place = np.array([y, 0.0, 0.0, 0.0, 0.0])
-    landing.begin(place, np.zeros(5))
-    landing.step(place, np.zeros(5), 1e3 * np.eye(5)[axis])
-    made = output_accelerations(
-        machine, y, 0.0, 0.0, landing.direct_current, landing.quadrature_current
-    )
-    attraction = machine.M_y * (machine.G - made[0])
-    assert abs(made[axis]) * machine.I_x / machine.r == pytest.approx(share * attraction, rel=1e-6)
-
-
-def test_the_balance_is_where_magnets_carry_the_platen() -> None:
-    balance = Landing(BridgeParameters()).arrays.balance
-    zero, machine = np.zeros(4), machine_constants(BridgeParameters().machine)
-    assert balance == pytest.approx(0.0287, abs=1e-4)
-    for side in (-1e-5, 1e-5):
-        fall = output_accelerations(machine, balance + side, 0.0, 0.0, zero, zero)[0]
-        assert np.sign(fall) == np.sign(side)
 
 
 def stick(flight: Flight, phase: int, current: float) -> None:
