@@ -13,14 +13,11 @@ when more than a twentieth of them survive.
 
 from __future__ import annotations
 
-import argparse
 import concurrent.futures
-import contextlib
 import os
 import random
 import re
 import shutil
-import signal
 import subprocess
 import sys
 import tempfile
@@ -29,9 +26,19 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
-from mutation import ROOT, Mutant, difference, edits_of, mutant_of, path_of
-
-ALLOWED = 0.05
+from mutation import (
+    ALLOWED,
+    INTERRUPTED,
+    ROOT,
+    Mutant,
+    difference,
+    edits_of,
+    heed_signals,
+    kill,
+    mutant_of,
+    parser_for,
+    path_of,
+)
 
 _CAMPAIGN = ('test/study/faults/test_campaign.py',)
 _BRIDGE = (
@@ -95,12 +102,6 @@ def _standing_on(module: str) -> set[str]:
     return {name.rsplit('.', 1)[-1] for name in reached}
 
 
-def _kill(process: subprocess.Popen[bytes]) -> None:
-    """With those that it branched off."""
-    with contextlib.suppress(ProcessLookupError):
-        os.killpg(process.pid, signal.SIGKILL)
-
-
 class Copy:
     """A copy of the tree, with compiled code and a ROS domain of its own."""
 
@@ -148,13 +149,13 @@ class Copy:
             except subprocess.TimeoutExpired:
                 return False
             finally:
-                _kill(process)
+                kill(process.pid)
 
     def end(self) -> None:
         """Test nothing any more: what is under way fails at once."""
         self.ended = True
         if self._running is not None:
-            _kill(self._running)
+            kill(self._running.pid)
 
     def warm_up(self, tests: tuple[str, ...]) -> float:
         """Compile what the unchanged tests need; returns how long tests and compiler took [s].
@@ -195,8 +196,8 @@ class Copy:
         return Outcome(mutant, survived, time.monotonic() - begin)
 
 
-def run(modules: list[str], number: int, seed: int, jobs: int) -> list[Outcome]:
-    """Judge ``number`` mutants, drawn evenly from all of the modules'."""
+def run(modules: list[str], number: int, seed: int, jobs: int) -> tuple[list[Outcome], bool]:
+    """Judge ``number`` mutants, drawn evenly from all of the modules'; whether none was left."""
     every = [(module, one) for module in modules for one in range(len(edits_of(module)[1]))]
     drawn = [mutant_of(*one) for one in random.Random(seed).sample(every, min(number, len(every)))]
     print(f'{len(drawn)} of {len(every)} mutants of {len(modules)} modules', flush=True)
@@ -225,27 +226,17 @@ def run(modules: list[str], number: int, seed: int, jobs: int) -> list[Outcome]:
                 print('\nmutants: interrupted', file=sys.stderr)
                 for copy in copies:
                     copy.end()
-    return outcomes
+    return outcomes, len(outcomes) == len(drawn)
 
 
 def main() -> int:
     """Entry point."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else '')
-    parser.add_argument(
-        '--modules',
-        nargs='+',
-        choices=sorted(LOOKED_AT_BY),
-        metavar='NAME',
-        default=sorted(LOOKED_AT_BY),
-        help='default: all that are known',
-    )
+    parser = parser_for(__doc__, LOOKED_AT_BY)
     parser.add_argument('--mutants', type=int, default=200, metavar='N')
     parser.add_argument('--seed', type=int, default=1, metavar='S')
-    parser.add_argument('--jobs', type=int, default=os.cpu_count() or 1, metavar='J')
     given = parser.parse_args()
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.default_int_handler)
-    outcomes = run(given.modules, given.mutants, given.seed, given.jobs)
+    heed_signals()
+    outcomes, complete = run(given.modules, given.mutants, given.seed, given.jobs)
     print()
     for module in given.modules:
         its = [outcome for outcome in outcomes if outcome.mutant.module == module]
@@ -256,7 +247,7 @@ def main() -> int:
     share, spent = lived / judged, sum(outcome.seconds for outcome in outcomes)
     print(f'{lived} of {len(outcomes)} survived: {100 * share:.1f} %, ', end='')
     print(f'{spent / judged:.0f} s each')
-    return int(share > ALLOWED)
+    return int(share > ALLOWED) if complete else INTERRUPTED
 
 
 if __name__ == '__main__':

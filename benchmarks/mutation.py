@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import argparse
 import ast
+import contextlib
 import difflib
-from collections.abc import Callable, Iterator
+import os
+import signal
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
+ALLOWED = 0.05
+"""Share of mutants that may survive."""
+
+INTERRUPTED = 130
 
 _OPPOSITES: dict[type[ast.AST], tuple[type[ast.AST], ...]] = {
     ast.Lt: (ast.LtE, ast.GtE),
@@ -168,3 +176,38 @@ def difference(mutant: Mutant) -> str:
     plain = ast.unparse(ast.parse(path_of(mutant.module, ROOT).read_text()))
     lines = difflib.unified_diff(plain.splitlines(), mutant.source.splitlines(), lineterm='', n=0)
     return '\n'.join(line for line in list(lines)[2:] if not line.startswith('@@'))
+
+
+def parser_for(documentation: str | None, modules: Iterable[str]) -> argparse.ArgumentParser:
+    """A parser for what says which modules, and how many at once."""
+    parser = argparse.ArgumentParser(description=(documentation or '').partition('\n')[0])
+    known = sorted(modules)
+    parser.add_argument(
+        '--modules',
+        nargs='+',
+        choices=known,
+        metavar='NAME',
+        default=known,
+        help='default: all that are known',
+    )
+    parser.add_argument('--jobs', type=int, default=os.cpu_count() or 1, metavar='J')
+    return parser
+
+
+def heed_signals() -> None:
+    """The first INT, TERM or HUP is a KeyboardInterrupt: what ends by it is not interrupted."""
+
+    def interrupt(*_: object) -> None:
+        for number in numbers:
+            signal.signal(number, signal.SIG_IGN)
+        raise KeyboardInterrupt
+
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    for number in numbers:
+        signal.signal(number, interrupt)
+
+
+def kill(group: int) -> None:
+    """End a process that leads a group, with those that it branched off."""
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(group, signal.SIGKILL)

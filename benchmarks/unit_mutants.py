@@ -3,32 +3,43 @@
 
     python benchmarks/unit_mutants.py [--modules NAME...] [--jobs J]
 
-All mutants of the modules that have such tests, a second or three each: a process that has imported
-the libraries branches off for every mutant and runs the tests with it, compiled code as plain
-Python. What survives may still be noticed by the tests that fly, see mutants.py. The exit code is 1
-when more than a twentieth survive.
+All mutants of the modules that have such tests, one to four seconds each: a process that has
+imported the libraries branches off for every mutant and runs the tests with it, compiled code as
+plain Python. What survives may still be noticed by the tests that fly, see mutants.py. The exit
+code is 1 when more than a twentieth survive.
 """
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import importlib
 import importlib.abc
 import importlib.machinery
 import importlib.util
 import os
-import signal
 import sys
 import time
 from types import ModuleType
 from typing import NamedTuple
 
-from mutation import ROOT, Mutant, difference, edits_of, mutant_of, path_of
+from mutation import (
+    ALLOWED,
+    INTERRUPTED,
+    ROOT,
+    Mutant,
+    difference,
+    edits_of,
+    heed_signals,
+    kill,
+    mutant_of,
+    parser_for,
+    path_of,
+)
 
-ALLOWED = 0.05
-_LIBRARIES = ('numpy', 'scipy.integrate', 'scipy.linalg', 'scipy.signal', 'scipy.optimize')
-_TOOLS = ('pytest', 'hypothesis.strategies', 'hypothesis.extra.pytestplugin', 'yaml', 'control')
+_LIBRARIES = (
+    *('numpy', 'scipy.integrate', 'scipy.linalg', 'scipy.signal', 'scipy.optimize', 'control'),
+    *('pytest', 'hypothesis.strategies', 'yaml'),
+)
 
 _BRIDGE = 'test/hw_bridge/test_'
 TESTS: dict[str, tuple[str, ...]] = {
@@ -121,29 +132,25 @@ def _next(running: dict[int, Child]) -> tuple[Child, bool]:
     while True:
         pid, status = os.waitpid(-1, os.WNOHANG)
         if pid in running:
-            _kill(pid)
+            kill(pid)
             return running.pop(pid), status == 0
         for late, child in running.items():
             if time.monotonic() > child.until:
-                _kill(late)
+                kill(late)
         time.sleep(0.01)
-
-
-def _kill(group: int) -> None:
-    with contextlib.suppress(ProcessLookupError):  # with those that it branched off
-        os.killpg(group, signal.SIGKILL)
 
 
 def judge(module: str, jobs: int) -> tuple[int, int]:
     """Mutants of a module that survived, and all. Raises SystemExit when its own tests fail."""
     running: dict[int, Child] = {}
-    _branch(module, None, running)
-    if not _next(running)[1]:
-        sys.exit(f'unit_mutants: without any change these tests fail: {" ".join(TESTS[module])}')
     mutants = [mutant_of(module, number) for number in range(len(edits_of(module)[1]))]
     waiting = [mutant for mutant in mutants if difference(mutant)]
     number, survived = len(waiting), 0
     try:
+        _branch(module, None, running)
+        if not _next(running)[1]:
+            tests = ' '.join(TESTS[module])
+            sys.exit(f'unit_mutants: without any change these tests fail: {tests}')
         while waiting or running:
             while waiting and len(running) < jobs:
                 _branch(module, waiting.pop(0), running)
@@ -155,31 +162,18 @@ def judge(module: str, jobs: int) -> tuple[int, int]:
             print(f'\r{module} {done}/{number}', end='', file=sys.stderr, flush=True)
     finally:
         for pid in running:
-            _kill(pid)
+            kill(pid)
     return survived, number
 
 
 def main() -> int:
     """Entry point."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else '')
-    parser.add_argument(
-        '--modules',
-        nargs='+',
-        choices=sorted(TESTS),
-        metavar='NAME',
-        default=sorted(TESTS),
-        help='default: all that have tests of their own',
-    )
-    parser.add_argument('--jobs', type=int, default=os.cpu_count() or 1, metavar='J')
-    given = parser.parse_args()
-    for caught in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(caught, signal.default_int_handler)
+    given = parser_for(__doc__, TESTS).parse_args()
+    heed_signals()
     os.chdir(ROOT)
-    for library in (*_LIBRARIES, *_TOOLS):
-        try:
+    for library in _LIBRARIES:
+        with contextlib.suppress(ModuleNotFoundError):  # only speed depends on it
             importlib.import_module(library)
-        except ModuleNotFoundError:
-            continue  # only speed depends on it
     survived = every = 0
     try:
         for module in given.modules:
@@ -188,7 +182,7 @@ def main() -> int:
             survived, every = survived + lived, every + number
     except KeyboardInterrupt:
         print('\nunit_mutants: interrupted', file=sys.stderr)
-        return 130
+        return INTERRUPTED
     print(f'{survived} of {every} survived: {100 * survived / every:.1f} %')
     return int(survived > ALLOWED * every)
 

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
-import fcntl
 import os
 import signal
 from collections.abc import Generator
-from pathlib import Path
 
 import pytest
 from _pytest.runner import runtestprotocol
@@ -28,20 +25,6 @@ _worker = os.environ.get('PYTEST_XDIST_WORKER', 'gw0').removeprefix('gw')
 _domains = os.environ.get('MAGLEV_TEST_DOMAINS', '').split()
 if _domains:
     os.environ['ROS_DOMAIN_ID'] = _domains[int(_worker) % len(_domains)]
-
-
-@pytest.hookimpl(wrapper=True)
-def pytest_collection() -> Generator[None, object, object]:
-    """One worker collects before the others, who need not compile the tests once more then."""
-    folder = os.environ.get('MAGLEV_TEST_RUN')  # set by run.sh
-    with Path(folder, 'collecting').open('w') if folder else contextlib.nullcontext() as lock:
-        if lock is None:
-            return (yield)
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            fcntl.flock(lock, fcntl.LOCK_SH)
-        return (yield)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from supervised import HOVER, QUICK, STANDING, STOP, lead
 
 from maglev_controller.bumpless_transfer import model_maps
 from maglev_controller.learning import iterative_learning
@@ -16,11 +17,7 @@ from maglev_model.modes import Mode
 from maglev_model.parameters import ParameterError, build
 from maglev_model.phases import Phase
 
-STOP = np.array([0.031, 0.0, 0.0, 0.0, 0.0])
-HOVER = np.array([0.025, 0.0, 0.0, 0.0, 0.0])
 ASIDE = np.array([0.025, 0.01, 0.0, 0.0, 0.0])
-STANDING = {'following.error': (1.0,) * 5}
-QUICK = STANDING | {'landing.braking_time': 0.05, 'landing.descent_time': 0.1}
 
 
 class Recorder:
@@ -43,25 +40,11 @@ class Recorder:
         return self
 
 
-def step(
-    supervisor: Supervisor,
-    sequence: int,
-    phase: Phase,
-    wanted: np.ndarray,
-    gap: float,
-    segment: int = 0,
-) -> Mode:
-    references = supervisor.references
-    references.store(sequence, phase, segment, wanted, np.zeros(5), np.zeros(5))
-    supervisor.step(references.find(sequence), np.full(4, gap), 0.0, 0.0)
-    return supervisor.mode
-
-
 def flying(sequence: int = 0, **overrides: Any) -> Supervisor:
     """Regulates since the sample with that sequence number."""
     supervisor = Supervisor(build(ControllerParameters, QUICK | overrides))
-    step(supervisor, sequence - 1 if sequence else 0, Phase.REST, STOP, 0.031)
-    assert step(supervisor, sequence or 1, Phase.TRACK, HOVER, 0.025) == Mode.REGULATING
+    lead(supervisor, sequence - 1 if sequence else 0, Phase.REST, STOP, 0.031)
+    assert lead(supervisor, sequence or 1, Phase.TRACK, HOVER, 0.025) == Mode.REGULATING
     return supervisor
 
 
@@ -76,27 +59,27 @@ def test_the_references_ring_may_begin_anew_in_flight() -> None:
     """The sample in its first row is one like any other."""
     supervisor = flying(sequence=1022)
     for sequence in (1023, 1024, 1025):
-        assert step(supervisor, sequence, Phase.TRACK, HOVER, 0.025) == Mode.REGULATING
+        assert lead(supervisor, sequence, Phase.TRACK, HOVER, 0.025) == Mode.REGULATING
 
 
 @pytest.mark.parametrize('end', ['given up', 'waiting', 'restarted', 'landed'])
 def test_however_it_ends_no_current_is_left(end: str) -> None:
     supervisor = flying()
     for sequence in range(2, 50):
-        step(supervisor, sequence, Phase.TRACK, HOVER if sequence < 40 else ASIDE, 0.025)
+        lead(supervisor, sequence, Phase.TRACK, HOVER if sequence < 40 else ASIDE, 0.025)
     assert supervisor.direct_current.all()
     assert supervisor.quadrature_current[[1, 3]].all()
     supervisor.limited_by = 3
     if end == 'given up':
         supervisor.give_up('a defect')
     if end == 'waiting':
-        step(supervisor, 51, Phase.END, STOP, 0.031)
+        lead(supervisor, 51, Phase.END, STOP, 0.031)
     if end == 'restarted':
         supervisor.restart()
     if end == 'landed':
         supervisor.disable()
         for sequence in range(51, 1000):
-            if step(supervisor, sequence, Phase.TRACK, HOVER, 0.0252) != Mode.LANDING:
+            if lead(supervisor, sequence, Phase.TRACK, HOVER, 0.0252) != Mode.LANDING:
                 break
         assert supervisor.mode == Mode.DISABLED
     assert not supervisor.direct_current.any()
@@ -109,8 +92,8 @@ def test_a_stage_that_begins_anew_begins_with_references_of_its_own() -> None:
     supervisor.restart()
     assert supervisor.references.newest == -1
     assert supervisor.reason == ''
-    step(supervisor, 0, Phase.REST, STOP, 0.031)
-    step(supervisor, 1, Phase.REST, STOP, 0.031)
+    lead(supervisor, 0, Phase.REST, STOP, 0.031)
+    lead(supervisor, 1, Phase.REST, STOP, 0.031)
     supervisor.references.store(0, Phase.REST, 0, STOP, np.zeros(5), np.zeros(5))  # of the next run
     supervisor.restart()
     assert supervisor.references.newest == 0
@@ -133,7 +116,7 @@ def test_after_a_fault_that_was_landed_there_is_none_left_but_itself() -> None:
     supervisor = flying()
     supervisor.stop('a stop')
     while (
-        step(supervisor, supervisor.references.newest + 1, Phase.TRACK, HOVER, 0.025)
+        lead(supervisor, supervisor.references.newest + 1, Phase.TRACK, HOVER, 0.025)
         == Mode.LANDING
     ):
         pass
@@ -145,15 +128,15 @@ def test_after_a_fault_that_was_landed_there_is_none_left_but_itself() -> None:
 def test_regulator_and_learning_begin_each_flight_anew() -> None:
     supervisor = flying()
     for sequence in range(2, 60):
-        step(supervisor, sequence, Phase.TRACK, HOVER, 0.0252)
+        lead(supervisor, sequence, Phase.TRACK, HOVER, 0.0252)
     assert supervisor.regulator.internal_model[0] != 0.0
-    step(supervisor, 60, Phase.END, STOP, 0.031)
+    lead(supervisor, 60, Phase.END, STOP, 0.031)
     learning = Recorder()
     supervisor.learning = learning  # type: ignore[assignment]
-    step(supervisor, 61, Phase.REST, STOP, 0.031)
+    lead(supervisor, 61, Phase.REST, STOP, 0.031)
     assert learning.told == []
     fresh = flying()
-    step(supervisor, 62, Phase.TRACK, HOVER, 0.025)
+    lead(supervisor, 62, Phase.TRACK, HOVER, 0.025)
     assert learning.told[0] == 'rest'
     np.testing.assert_array_equal(
         supervisor.regulator.internal_model, fresh.regulator.internal_model
@@ -164,39 +147,39 @@ def test_regulator_and_learning_begin_each_flight_anew() -> None:
 def test_learning_looks_ahead_and_learns_in_each_sample_where_it_repeats(phase: Phase) -> None:
     supervisor, learning = flying(), Recorder()
     supervisor.learning = learning  # type: ignore[assignment]
-    step(supervisor, 2, phase, HOVER, 0.025)
+    lead(supervisor, 2, phase, HOVER, 0.025)
     arrays = supervisor.regulator.arrays
     assert learning.told == [('look', arrays, phase == Phase.TRACK), ('learn', arrays)]
     learning.told.clear()
     supervisor.disable()
-    step(supervisor, 3, phase, HOVER, 0.025)
+    lead(supervisor, 3, phase, HOVER, 0.025)
     assert learning.told == [('look', arrays, False), ('learn', arrays)]
 
 
 def test_only_a_new_step_begins_the_models_anew() -> None:
     supervisor = flying(**{'internal_model.restart_at_step': True})
     for sequence in range(2, 40):
-        step(supervisor, sequence, Phase.STEP, HOVER, 0.0252, segment=0)
+        lead(supervisor, sequence, Phase.STEP, HOVER, 0.0252, segment=0)
     before = abs(supervisor.regulator.internal_model[0])
-    step(supervisor, 40, Phase.STEP, HOVER, 0.0252, segment=1)
+    lead(supervisor, 40, Phase.STEP, HOVER, 0.0252, segment=1)
     assert supervisor.regulator.internal_model[0] == 0.0
     for sequence in range(41, 79):
-        step(supervisor, sequence, Phase.STEP, HOVER, 0.0252, segment=1)
+        lead(supervisor, sequence, Phase.STEP, HOVER, 0.0252, segment=1)
     assert abs(supervisor.regulator.internal_model[0]) == pytest.approx(before, rel=0.2)
 
 
 def test_what_the_regulator_cannot_go_on_with_is_a_stop(monkeypatch: pytest.MonkeyPatch) -> None:
     supervisor = flying()
     monkeypatch.setattr(Regulator, 'fault', property(lambda _: 'a law that is late'))
-    step(supervisor, 2, Phase.TRACK, HOVER, 0.025)
+    lead(supervisor, 2, Phase.TRACK, HOVER, 0.025)
     assert (supervisor.mode, supervisor.reason) == (Mode.LANDING, 'a law that is late')
-    step(supervisor, 3, Phase.TRACK, HOVER, 0.025)
+    lead(supervisor, 3, Phase.TRACK, HOVER, 0.025)
     assert supervisor.mode == Mode.LANDING
 
 
 def test_from_where_it_was_led_last_it_lands() -> None:
     supervisor = flying()
-    step(supervisor, 2, Phase.TRACK, ASIDE, 0.025)
+    lead(supervisor, 2, Phase.TRACK, ASIDE, 0.025)
     supervisor.disable()
     assert supervisor._landing is not None
     position, _, _ = supervisor._landing.step()
@@ -230,13 +213,13 @@ def test_a_new_regulator_is_watched_by_its_own_bounds_and_lands_on_its_own_stop(
     regulator = Regulator(higher)
     supervisor.adopt(regulator, model_maps(supervisor.regulator.arrays, regulator.arrays))
     stop = np.array([0.0305, 0.0, 0.0, 0.0, 0.0])
-    step(supervisor, 0, Phase.REST, stop, 0.0305)
-    step(supervisor, 1, Phase.TRACK, HOVER, 0.025)
-    assert step(supervisor, 2, Phase.END, stop, 0.0301) == Mode.WAITING
-    step(supervisor, 3, Phase.REST, stop, 0.0305)
-    step(supervisor, 4, Phase.TRACK, HOVER, 0.025)
+    lead(supervisor, 0, Phase.REST, stop, 0.0305)
+    lead(supervisor, 1, Phase.TRACK, HOVER, 0.025)
+    assert lead(supervisor, 2, Phase.END, stop, 0.0301) == Mode.WAITING
+    lead(supervisor, 3, Phase.REST, stop, 0.0305)
+    lead(supervisor, 4, Phase.TRACK, HOVER, 0.025)
     for sequence in range(5, 60):
-        step(supervisor, sequence, Phase.TRACK, HOVER, 0.028)
+        lead(supervisor, sequence, Phase.TRACK, HOVER, 0.028)
     assert supervisor.mode == Mode.FAULT  # 3 mm off its way, which the bounds before allowed
 
 

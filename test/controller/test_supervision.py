@@ -7,6 +7,7 @@ import functools
 
 import numpy as np
 import pytest
+from supervised import HOVER, QUICK, STANDING, STOP, lead
 
 from maglev_controller.bumpless_transfer import model_maps
 from maglev_controller.parameters import ControllerParameters
@@ -16,13 +17,6 @@ from maglev_model.controller_watch import Status
 from maglev_model.modes import Mode
 from maglev_model.parameters import ParameterError, build
 from maglev_model.phases import Phase
-
-STOP = np.array([0.031, 0.0, 0.0, 0.0, 0.0])
-HOVER = np.array([0.025, 0.0, 0.0, 0.0, 0.0])
-
-
-STANDING = {'following.error': (1.0,) * 5}
-"""For a platen that stands where the test says, whatever the reference wants."""
 
 
 @pytest.fixture
@@ -42,11 +36,7 @@ class Flight:
     ) -> Mode:
         """The mode after a sample with the platen level at ``gap`` and ``x``."""
         self.sequence += 1
-        references = self.supervisor.references
-        references.store(self.sequence, phase, segment, wanted, np.zeros(5), np.zeros(5))
-        row = references.find(self.sequence)
-        self.supervisor.step(row, np.full(4, gap), x, 0.0)
-        return self.supervisor.mode
+        return lead(self.supervisor, self.sequence, phase, wanted, gap, x, segment)
 
 
 def test_an_enable_waits_for_the_next_lift_off(supervisor: Supervisor) -> None:
@@ -76,11 +66,6 @@ def test_a_landing_cannot_be_called_off(supervisor: Supervisor) -> None:
 # -- every call in every state ---------------------------------------------------------------------
 
 
-QUICK = STANDING | {
-    'landing.braking_time': 0.05,
-    'landing.descent_time': 0.1,
-    'landing.settle_time': 0.01,
-}
 LANDING_SAMPLES = 160
 
 
