@@ -10,12 +10,12 @@ _RECORDER = 'maglev_monitor.bag.recorder:RecorderNode'
 
 def monitor() -> None:
     """Entry point of the executable ``monitor``."""
-    main('monitor', _MONITOR, background=True)
+    main('monitor', _MONITOR)
 
 
 def recorder() -> None:
     """Entry point of the executable ``recorder``."""
-    main('recorder', _RECORDER, background=True)
+    main('recorder', _RECORDER)
 
 
 def watchers() -> None:
@@ -23,4 +23,4 @@ def watchers() -> None:
 
     To each of which the middleware then brings a message once.
     """
-    main('watchers', _RECORDER, _MONITOR, background=True)
+    main('watchers', _RECORDER, _MONITOR)

@@ -6,6 +6,7 @@ import ctypes
 import os
 import resource
 import time
+from contextlib import suppress
 from pathlib import Path
 
 _SPINNING = 'dds.asyn'
@@ -40,6 +41,22 @@ def take_priority(priority: int) -> bool:
     except OSError:
         return False
     return True
+
+
+def give_priority_back() -> None:
+    """Put the threads of this process that are under SCHED_FIFO back under SCHED_OTHER."""
+    for thread in _threads():
+        with suppress(OSError):  # it has ended
+            if os.sched_getscheduler(int(thread.name)) == os.SCHED_FIFO:
+                os.sched_setscheduler(int(thread.name), os.SCHED_OTHER, os.sched_param(0))
+
+
+def take_niceness(niceness: int) -> None:
+    """Let all threads of this process yield to others; none is made less nice than it is."""
+    for thread in _threads():
+        with suppress(OSError):
+            own = os.getpriority(os.PRIO_PROCESS, int(thread.name))
+            os.setpriority(os.PRIO_PROCESS, int(thread.name), max(own, niceness))
 
 
 def _limit_bursts() -> None:

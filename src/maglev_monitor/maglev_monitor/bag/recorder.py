@@ -26,9 +26,10 @@ from maglev_model.revision import revision
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.log_time import LogTimes
 from maglev_monitor.bag.writer import BagWriter
-from maglev_node.node import MaglevNode, NodeError, NodeParameters
+from maglev_node.node import NodeError
 from maglev_node.polling import PolledSubscription
-from maglev_node.topics import DIAGNOSTICS, SAMPLE_TOPICS
+from maglev_node.topics import DIAGNOSTICS, MEASUREMENT, SAMPLE_TOPICS
+from maglev_node.watcher import WatcherNode, WatcherParameters
 
 TOPICS: dict[str, type] = {
     **SAMPLE_TOPICS,
@@ -51,7 +52,7 @@ _POLL_PERIOD = 0.05
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class RecorderParameters(NodeParameters):
+class RecorderParameters(WatcherParameters):
     """The recorder's parameters."""
 
     output: str = parameter('bag', "the bag's folder, which must not exist yet")
@@ -62,7 +63,7 @@ class RecorderParameters(NodeParameters):
     )
 
 
-class RecorderNode(MaglevNode[RecorderParameters]):
+class RecorderNode(WatcherNode[RecorderParameters]):
     """Takes the raw messages of all topics in bursts and writes them to a bag."""
 
     interface: ClassVar[Mapping[str, str]] = dict.fromkeys(TOPICS, 'subscribed: each message')
@@ -88,6 +89,7 @@ class RecorderNode(MaglevNode[RecorderParameters]):
 
     def close(self) -> None:
         """Take what still waits and finish the bag."""
+        super().close()
         self._poll()
         self._log_times.end()
         self._poll()
@@ -118,7 +120,10 @@ class RecorderNode(MaglevNode[RecorderParameters]):
             return
         try:
             for topic, tap in self._taps.items():
-                messages = self._log_times.of(type_name(TOPICS[topic]), list(tap.take()))
+                taken = list(tap.take())
+                if topic == MEASUREMENT:
+                    self.take_rank(message for message, _ in taken)
+                messages = self._log_times.of(type_name(TOPICS[topic]), taken)
                 if not messages:
                     continue
                 if tap.topic not in self._writer.counts:

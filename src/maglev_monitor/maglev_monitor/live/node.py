@@ -18,16 +18,17 @@ from maglev_monitor.metrics.result_file import write_metrics
 from maglev_monitor.metrics.run_parameters import FAULT_LEVEL, RUN_KEY, run_to_json
 from maglev_monitor.report.terminal import as_text
 from maglev_node import topics
-from maglev_node.node import MaglevNode, NodeError, NodeParameters
+from maglev_node.node import NodeError
 from maglev_node.polling import PolledSubscription
 from maglev_node.stamp import nanoseconds
 from maglev_node.topics import KEYS
+from maglev_node.watcher import WatcherNode, WatcherParameters
 
 _POLL_PERIOD = 0.05
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class MonitorParameters(NodeParameters, WatchParameters):
+class MonitorParameters(WatcherParameters, WatchParameters):
     """The monitor's parameters."""
 
     output: str = parameter('', 'file for metrics.json; empty: none')
@@ -36,7 +37,7 @@ class MonitorParameters(NodeParameters, WatchParameters):
     )
 
 
-class MonitorNode(MaglevNode[MonitorParameters]):
+class MonitorNode(WatcherNode[MonitorParameters]):
     """Takes the samples of all topics in bursts; polls, so that the loop keeps the cores."""
 
     interface: ClassVar[Mapping[str, str]] = dict.fromkeys(KEYS, 'subscribed: each sample')
@@ -58,6 +59,7 @@ class MonitorNode(MaglevNode[MonitorParameters]):
 
     def close(self) -> None:
         """Leave the figures of a run that was broken off."""
+        super().close()
         if not self._concluded:
             self._conclude(self._arrived())
 
@@ -99,8 +101,10 @@ class MonitorNode(MaglevNode[MonitorParameters]):
     def _poll(self) -> None:
         if self._concluded:
             return
+        arrived = self._arrived()
+        self.take_rank(arrived[KEYS[topics.MEASUREMENT]])
         try:
-            self._watch.add(self._arrived())
+            self._watch.add(arrived)
         except DecodeError as error:
             self._stop_watching(str(error))
             return
