@@ -22,19 +22,23 @@ from maglev_model.wire import Incoming, Outgoing
 from maglev_node.dds import prepare_middleware
 from maglev_node.polling import PolledSubscription, PollingNode
 from maglev_node.topics import (
+    CONTROLLER_PROGRESS,
     CONTROLLER_STATE,
     CURRENTS,
     KEYS,
     MEASUREMENT,
+    PROGRESS,
+    PROGRESS_PERIOD,
     REFERENCE,
     SAMPLE_TOPICS,
+    STAGE_PROGRESS,
     TRUE_STATE,
     sample_qos,
 )
 
 PARTS = ('watchers', 'stage', 'controller', 'reference')
 LEAD = 64  # samples that references are ahead
-READERS = 4  # of a measurement: controller, reference, recorder and monitor
+READERS = 3  # of a measurement: controller, recorder and monitor
 
 
 class Part:
@@ -44,15 +48,16 @@ class Part:
         self.node = PollingNode(name)
         self.ticks: list[float] = []
         self._out: dict[str, tuple[Any, Outgoing]] = {}
-        self._read = {topic: Incoming(KEYS[topic]).read for topic in KEYS}
+        self._read = {topic: Incoming(KEYS[_kind(topic)]).read for topic in (*KEYS, *PROGRESS)}
         self._sequence = self._newest = 0
         self._sent = 0.0
 
     def publish(self, *topics: str) -> None:
         """Have publishers."""
         for topic in topics:
-            publisher = self.node.create_publisher(SAMPLE_TOPICS[topic], topic, sample_qos())
-            self._out[topic] = publisher, Outgoing(KEYS[topic], 'stage')
+            kind, qos = _kind(topic), sample_qos(1) if topic in PROGRESS else sample_qos()
+            publisher = self.node.create_publisher(SAMPLE_TOPICS[kind], topic, qos)
+            self._out[topic] = publisher, Outgoing(KEYS[kind], 'stage')
 
     def hear(self, topic: str, callback: Any) -> None:
         """Be called for each message."""
@@ -66,7 +71,7 @@ class Part:
     def taps(self, depth: int, *topics: str) -> list[PolledSubscription]:
         """Queues that are looked at now and then."""
         return [
-            self.node.poll(topic, SAMPLE_TOPICS[topic], sample_qos(depth), raw=True)
+            self.node.poll(topic, SAMPLE_TOPICS[_kind(topic)], sample_qos(depth), raw=True)
             for topic in topics
         ]
 
@@ -78,12 +83,15 @@ class Part:
 
     def stage(self) -> None:
         """Send a measurement and the truth, once its currents have come the next."""
-        self.publish(MEASUREMENT, TRUE_STATE)
+        self.publish(MEASUREMENT, STAGE_PROGRESS, TRUE_STATE)
         self.hear(CURRENTS, self._answered)
         self.every(0.1, self._begin)
 
     def _begin(self) -> None:
-        if self._out[MEASUREMENT][0].get_subscription_count() == READERS and not self.ticks:
+        heard = [
+            self._out[topic][0].get_subscription_count() for topic in (MEASUREMENT, STAGE_PROGRESS)
+        ]
+        if heard == [READERS, 1] and not self.ticks:
             self._advance()
 
     def _answered(self, message: bytes) -> None:
@@ -95,17 +103,21 @@ class Part:
         self._sequence += 1
         self._sent = time.perf_counter()
         self.send(MEASUREMENT, self._sequence)
+        if self._sequence % PROGRESS_PERIOD == 0:
+            self.send(STAGE_PROGRESS, self._sequence)
         self.send(TRUE_STATE, self._sequence)
 
     def controller(self) -> None:
         """Answer each measurement, tell of it, and take what references have come."""
-        self.publish(CURRENTS, CONTROLLER_STATE)
+        self.publish(CURRENTS, CONTROLLER_STATE, CONTROLLER_PROGRESS)
         (references,) = self.taps(16384, REFERENCE)
 
         def answer(message: bytes) -> None:
             sequence = self._read[MEASUREMENT](message).sequence
             self.send(CURRENTS, sequence)
             self.send(CONTROLLER_STATE, sequence)
+            if sequence % PROGRESS_PERIOD == 0:
+                self.send(CONTROLLER_PROGRESS, sequence)
 
         def take() -> None:
             for message, _ in references.take():
@@ -117,13 +129,13 @@ class Part:
     def reference(self) -> None:
         """Send references so far ahead of the newest measurement."""
         self.publish(REFERENCE)
-        measurements, states = self.taps(1, MEASUREMENT, CONTROLLER_STATE)
+        measurements, states = self.taps(1, STAGE_PROGRESS, CONTROLLER_PROGRESS)
 
         def look() -> None:
             for message, _ in states.take(1):
-                self._read[CONTROLLER_STATE](message)
+                self._read[CONTROLLER_PROGRESS](message)
             for message, _ in measurements.take(1):
-                ahead = self._read[MEASUREMENT](message).sequence + LEAD
+                ahead = self._read[STAGE_PROGRESS](message).sequence + LEAD
                 for sequence in range(self._newest + 1, ahead + 1):
                     self.send(REFERENCE, sequence)
                 self._newest = ahead
@@ -143,6 +155,10 @@ class Part:
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             executor.spin_until_future_complete(never, timeout_sec=0.1)
+
+
+def _kind(topic: str) -> str:
+    return PROGRESS.get(topic, topic)
 
 
 def tick(seconds: float) -> float:

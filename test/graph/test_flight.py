@@ -5,7 +5,10 @@ from __future__ import annotations
 import signal
 import sys
 import time
+from collections.abc import Callable, Sequence
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +27,18 @@ from flight import (
 from graph import Nodes, Observer, Process
 
 from maglev_msgs.msg import ControllerState, Measurement, Reference
-from maglev_node.topics import CONTROLLER_STATE, MEASUREMENT, REFERENCE, reference_qos, sample_qos
+from maglev_node.topics import (
+    CONTROLLER_PROGRESS,
+    CONTROLLER_STATE,
+    MEASUREMENT,
+    PROGRESS,
+    PROGRESS_PERIOD,
+    REFERENCE,
+    SAMPLE_TOPICS,
+    STAGE_PROGRESS,
+    reference_qos,
+    sample_qos,
+)
 
 STRANGER = Path(__file__).resolve().parents[1] / 'support' / 'stranger.py'
 
@@ -45,17 +59,39 @@ def errors_on_time(observer: Observer, first: int) -> np.ndarray:
     return np.array([message.error[:3] for message in flown])[on_time]
 
 
+def in_part(messages: Sequence[Any], steady: Callable[[Any], bool]) -> list[int]:
+    """The samples of which those tell on a topic of progress."""
+    return [
+        message.sequence
+        for before, message in pairwise([None, *messages])
+        if before is None
+        or not (steady(before) and steady(message))
+        or message.sequence % PROGRESS_PERIOD == 0
+    ]
+
+
 def test_lift_off_ellipse_landing(nodes: Nodes, watching: Observer) -> None:
+    watching.watch(*PROGRESS)
     graph = fly(nodes, 'duration:=1.0', 'exit_at_end:=true')
     watching.wait(lambda: not graph['reference'].running, timeout=60)
     assert graph['reference'].wait() == 0, graph['reference'].output
     watching.wait(lambda: landed_without_current(watching))
     assert impact_speed(watching) < 0.05
-    for topic, messages in watching.look().items():
+    for topic in SAMPLE_TOPICS:
+        messages = watching.look()[topic]
         numbers = [message.sequence for message in messages]
         numbers = numbers[numbers.count(0) - 1 :]  # sample 0 is repeated until it is answered
         assert numbers == list(range(len(numbers))), f'{topic} lost or repeated samples'
-    modes = [message.mode for message in watching.messages[CONTROLLER_STATE]]
+    states = watching.messages[CONTROLLER_STATE]
+    modes = [message.mode for message in states]
+    for topic, due in {
+        STAGE_PROGRESS: in_part(watching.messages[MEASUREMENT], lambda m: m.controller != 0),
+        CONTROLLER_PROGRESS: in_part(states, lambda m: m.mode == ControllerState.REGULATING),
+    }.items():
+        numbers = [message.sequence for message in watching.messages[topic]]
+        assert set(numbers) <= set(due)
+        assert len(numbers) > 0.9 * len(due)  # of which only the newest is sure to come
+        assert len(numbers) < 0.5 * len(modes)
     assert ControllerState.FAULT not in modes
     assert ControllerState.LANDING not in modes
     samples(watching, 10)
@@ -144,13 +180,18 @@ def test_what_a_second_stage_repeats_does_not_stop_the_flight(
     """It covers what the stage measured last, for a reference that looks seldom."""
     graph = fly(nodes, LONG, 'autostart:=false', 'poll_period:=0.05')
     lift_off_of_age(graph, watching)  # while it is young, a stage leaves where there is another
-    second = watching.node.create_publisher(Measurement, MEASUREMENT, sample_qos())
+    seconds = [
+        watching.node.create_publisher(Measurement, topic, sample_qos())
+        for topic in (MEASUREMENT, STAGE_PROGRESS)
+    ]
     gap = [LOWER_STOP] * 4
     end = time.monotonic() + 2.0
     while time.monotonic() < end:
-        second.publish(Measurement(sequence=0, gap=gap, lockstep=True))
+        for second in seconds:
+            second.publish(Measurement(sequence=0, gap=gap, lockstep=True))
         time.sleep(0.01)
-    watching.node.destroy_publisher(second)
+    for second in seconds:
+        watching.node.destroy_publisher(second)
     watching.serve(0.5)
     begin = max(message.sequence for message in watching.look()[MEASUREMENT])
     watching.wait(lambda: watching.newest(CONTROLLER_STATE).sequence > begin + 500, timeout=5.0)

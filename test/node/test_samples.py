@@ -12,7 +12,14 @@ from maglev_model.wire import TOPIC_TYPES, Incoming, Outgoing
 from maglev_msgs.msg import Currents
 from maglev_node import samples
 from maglev_node.stamp import nanoseconds, set_stamp
-from maglev_node.topics import CURRENTS, KEYS, SAMPLE_TOPICS
+from maglev_node.topics import (
+    CURRENTS,
+    KEYS,
+    MEASUREMENT,
+    SAMPLE_TOPICS,
+    STAGE_PROGRESS,
+    sample_qos,
+)
 
 STAMP = 1_790_000_000_123_456_789
 
@@ -51,6 +58,41 @@ def test_what_ros_writes_is_read(topic: str, frame: str) -> None:
     assert received.stamp == STAMP
     for name, value in sent(topic).items():
         np.testing.assert_array_equal(getattr(received, name), value)
+
+
+class Publishers:
+    """A node whose publishers keep what they are given, by topic."""
+
+    def __init__(self) -> None:
+        self.sent: dict[str, list[Any]] = {}
+
+    def create_publisher(self, kind: type, topic: str, _qos: object) -> Any:
+        sent = self.sent[topic] = []
+
+        class Publisher:
+            def publish(self, message: bytes) -> None:
+                sent.append(deserialize_message(message, kind))
+
+        return Publisher()
+
+
+@pytest.mark.parametrize('first', [0, 3, 16, 31])
+def test_progress_is_each_sample_until_it_is_steady_then_every_sixteenth(first: int) -> None:
+    node: Any = Publishers()
+    measured = samples.SampleWriter(node, MEASUREMENT, sample_qos())
+    progress = samples.ProgressWriter(node, STAGE_PROGRESS, measured)
+    resting, flying = range(first, first + 5), range(first + 5, first + 60)
+    landed = range(first + 60, first + 64)
+    for sequence in (*resting, *flying, *landed):
+        measured['sequence'] = sequence
+        measured.publish()
+        progress.publish(sequence, steady=sequence in flying)
+    assert [message.sequence for message in node.sent[MEASUREMENT]] == list(
+        range(first, first + 64)
+    )
+    due = [sequence for sequence in flying[1:] if sequence in (16, 32, 48, 64, 80)]
+    expected = [*resting, flying[0], *due, *landed]
+    assert [message.sequence for message in node.sent[STAGE_PROGRESS]] == expected
 
 
 def test_what_cannot_be_read_is_left_out_and_said() -> None:

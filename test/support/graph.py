@@ -28,7 +28,7 @@ from std_srvs.srv import SetBool, Trigger
 from maglev_model.wire import record_type
 from maglev_node.dds import prepare_middleware
 from maglev_node.polling import PolledSubscription, PollingNode
-from maglev_node.topics import KEYS, SAMPLE_TOPICS
+from maglev_node.topics import KEYS, PROGRESS, SAMPLE_TOPICS
 
 ROOT = Path(__file__).resolve().parents[2]
 PARAMS = ROOT / 'params'
@@ -178,7 +178,8 @@ class Heard(Sequence[Any]):
     """Messages of a topic as they came; each is decoded when somebody looks at it."""
 
     def __init__(self, topic: str) -> None:
-        self._kind, self._key = SAMPLE_TOPICS[topic], KEYS[topic]
+        sampled = PROGRESS.get(topic, topic)
+        self._kind, self._key = SAMPLE_TOPICS[sampled], KEYS[sampled]
         self._held: list[bytes] = []
         self._decoded: dict[int, Any] = {}
 
@@ -228,7 +229,8 @@ class Observer:
         """Keep the messages of these topics from now on."""
         for topic in topics:
             self.messages[topic] = Heard(topic)
-            self._subscriptions[topic] = self.node.poll(topic, SAMPLE_TOPICS[topic], raw=True)
+            kind = SAMPLE_TOPICS[PROGRESS.get(topic, topic)]
+            self._subscriptions[topic] = self.node.poll(topic, kind, raw=True)
 
     def look(self) -> dict[str, Heard]:
         """All messages so far, by topic."""

@@ -14,7 +14,7 @@ from maglev_model.wire import Incoming
 from maglev_msgs.msg import Measurement
 from maglev_node.stage_parameters import ClockedStageParameters
 from maglev_node.stamp import nanoseconds, set_stamp
-from maglev_node.topics import KEYS, SAMPLE_TOPICS
+from maglev_node.topics import KEYS, PROGRESS, SAMPLE_TOPICS
 
 KEYS_OF_KINDS = {kind: KEYS[topic] for topic, kind in SAMPLE_TOPICS.items()}
 
@@ -83,7 +83,8 @@ class MadeUpNode:
     def __init__(self, **parameters: Any) -> None:
         self.parameters = ClockedStageParameters(**parameters)
         self.topics: dict[type, Topic] = {}
-        self.depths: set[int] = set()  # of its publishers
+        self.depths: set[int] = set()  # of the publishers of each sample
+        self.progress: dict[str, Topic] = {}
         self.errors: list[str] = []
         self.failed: list[str] = []
         self.timers: list[Any] = []
@@ -98,7 +99,9 @@ class MadeUpNode:
         names = self.subscribers.get(topic, [])
         return [SimpleNamespace(node_name=name, node_namespace='/') for name in names]
 
-    def create_publisher(self, message_type: type, _topic: str, qos: QoSProfile) -> Topic:
+    def create_publisher(self, message_type: type, topic: str, qos: QoSProfile) -> Topic:
+        if topic in PROGRESS:
+            return self.progress.setdefault(topic, Topic(message_type))
         self.depths.add(qos.depth)
         return self.topics.setdefault(message_type, Topic(message_type))
 

@@ -20,8 +20,9 @@ from maglev_model.phases import Phase
 from maglev_node.graph_guard import GraphGuard, Watchers
 from maglev_node.mode_check import mode_conflict
 from maglev_node.node import MaglevNode, SourceParameters
-from maglev_node.samples import SampleQueue, SampleWriter, hear
+from maglev_node.samples import ProgressWriter, SampleQueue, SampleWriter, hear
 from maglev_node.topics import (
+    CONTROLLER_PROGRESS,
     CONTROLLER_STATE,
     CURRENTS,
     KEPT,
@@ -70,6 +71,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         REFERENCE: 'subscribed: where the platen shall be, ahead of time',
         CURRENTS: 'published: the currents that answer a sample',
         CONTROLLER_STATE: 'published: mode, errors and internal models of each sample',
+        CONTROLLER_PROGRESS: 'published: the same, while it regulates every sixteenth',
         '~/enable': 'std_srvs/SetBool: follow the reference; false: land',
         '~/emergency_stop': 'std_srvs/Trigger: land, and end in a fault',
         '~/reset': 'std_srvs/Trigger: clear a fault',
@@ -97,6 +99,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         self._currents = SampleWriter(self, CURRENTS, qos)
         self._currents['session'] = self._session
         self._state = SampleWriter(self, CONTROLLER_STATE, qos)
+        self._progress = ProgressWriter(self, CONTROLLER_PROGRESS, self._state)
         self._watchers = Watchers(self, self.parameters.watchers)
         self._references = SampleQueue(self, REFERENCE, reference_qos())
         self._measurements = hear(self, MEASUREMENT, self._on_measurement)
@@ -236,6 +239,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         message['virtual_input'] = regulator.virtual_input
         message['internal_model'] = regulator.internal_model
         message.publish()
+        self._progress.publish(sequence, steady=self.supervisor.mode == Mode.REGULATING)
 
     def _log_change(self) -> None:
         mode, reason = self._logged = (self.supervisor.mode, self.supervisor.reason)

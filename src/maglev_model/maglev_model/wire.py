@@ -113,6 +113,9 @@ TOPIC_TYPES = {
 
 KEY_OF_MESSAGE_TYPE = {topic.message_type: key for key, topic in TOPIC_TYPES.items()}
 
+IN_PART = '/progress'
+"""How the names of topics end that repeat a part of another's messages."""
+
 _ENCAPSULATION = b'\x00\x01\x00\x00'  # plain CDR, little endian
 _FRAME_ID_LENGTH = slice(12, 16)
 _STRUCT_CODES = {'i4': 'i', 'u1': 'B', 'u4': 'I', 'u8': 'Q', 'f8': 'd', 'b1': '?'}

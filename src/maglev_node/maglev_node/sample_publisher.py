@@ -7,12 +7,13 @@ from typing import Any, TypeVar
 
 from rosgraph_msgs.msg import Clock
 
+from maglev_model.controller_watch import NOBODY
 from maglev_model.stage import EncoderSample, Truth
 from maglev_node.graph_guard import Watchers
 from maglev_node.node import MaglevNode, SourceParameters
-from maglev_node.samples import SampleWriter
+from maglev_node.samples import ProgressWriter, SampleWriter
 from maglev_node.stamp import set_stamp
-from maglev_node.topics import CLOCK, KEPT, MEASUREMENT, TRUE_STATE, sample_qos
+from maglev_node.topics import CLOCK, KEPT, MEASUREMENT, STAGE_PROGRESS, TRUE_STATE, sample_qos
 
 _CLOCK_SAMPLES = 10
 """Samples from one message on ``clock`` to the next."""
@@ -35,6 +36,7 @@ class SamplePublisher:
         qos = sample_qos(KEPT[node.parameters.mode])
         self._measurement = SampleWriter(node, MEASUREMENT, qos)
         self._measurement['lockstep'] = lockstep
+        self._progress = ProgressWriter(node, STAGE_PROGRESS, self._measurement)
         self._topics = [MEASUREMENT]
         self._watchers = Watchers(node, node.parameters.watchers)
         self._true_state: SampleWriter | None = None
@@ -68,6 +70,7 @@ class SamplePublisher:
         message['gap'], message['x'], message['z'] = sample
         message['late_samples'], message['controller'] = late_samples, controller
         message.publish()
+        self._progress.publish(sequence, steady=controller != NOBODY)
         if truth is not None and self._true_state is not None:
             self._publish_truth(self._true_state, sequence, stamp, truth)
         since = sequence - self._first[0]
@@ -91,7 +94,8 @@ class SamplePublisher:
 
     def destroy(self) -> None:
         """Leave the graph."""
-        writers = [self._measurement, *([self._true_state] if self._true_state else [])]
+        truth = [self._true_state] if self._true_state else []
+        writers = [self._measurement, self._progress, *truth]
         clock = [self._clock_publisher] if self._clock_publisher else []
         for publisher in [*(writer.publisher for writer in writers), *clock]:
             self._node.destroy_publisher(publisher)

@@ -12,7 +12,7 @@ from rclpy.subscription import Subscription
 
 from maglev_model.wire import DecodeError, Incoming, Outgoing
 from maglev_node.polling import PollingNode
-from maglev_node.topics import KEYS, SAMPLE_TOPICS, sample_qos
+from maglev_node.topics import KEYS, PROGRESS, PROGRESS_PERIOD, SAMPLE_TOPICS, sample_qos
 
 _FRAME = 'stage'
 
@@ -34,7 +34,32 @@ class SampleWriter:
 
     def publish(self) -> None:
         """Publish the message as it is now."""
-        self.publisher.publish(self._message.serialized())
+        self.publisher.publish(self.serialized())
+
+    def serialized(self) -> bytes:
+        """The message as it is now."""
+        return self._message.serialized()
+
+
+class ProgressWriter:
+    """Passes the messages of a sample topic on, to whoever need not be woken for each of them.
+
+    In flight each reader of each sample takes its time of the loop's.
+    """
+
+    def __init__(self, node: Node, topic: str, samples: SampleWriter) -> None:
+        self.publisher = node.create_publisher(SAMPLE_TOPICS[PROGRESS[topic]], topic, sample_qos(1))
+        self._samples = samples
+        self._steady = False
+
+    def publish(self, sequence: int, *, steady: bool) -> None:
+        """Publish the sample if it is one of each period, or what it tells is not steady.
+
+        Nor is it where that begins.
+        """
+        if not (steady and self._steady) or sequence % PROGRESS_PERIOD == 0:
+            self.publisher.publish(self._samples.serialized())
+        self._steady = steady
 
 
 class SampleReader:
@@ -42,7 +67,7 @@ class SampleReader:
 
     def __init__(self, node: Node, topic: str) -> None:
         self._node, self._topic = node, topic
-        self._incoming = Incoming(KEYS[topic])
+        self._incoming = Incoming(KEYS[PROGRESS.get(topic, topic)])
 
     def read(self, message: bytes) -> Any:
         """A named tuple of the header's ``stamp`` [ns] and the message's fields, or None."""
@@ -74,10 +99,11 @@ def hear(
 
 
 class SampleQueue:
-    """A sample topic whose messages wait until they are taken."""
+    """A topic of samples, or of their progress, whose messages wait until they are taken."""
 
     def __init__(self, node: PollingNode, topic: str, qos: QoSProfile | None = None) -> None:
-        self._queue = node.poll(topic, SAMPLE_TOPICS[topic], qos, raw=True)
+        kind = SAMPLE_TOPICS[PROGRESS.get(topic, topic)]
+        self._queue = node.poll(topic, kind, qos, raw=True)
         self._reader = SampleReader(node, topic)
         self.topic = self._queue.topic
 

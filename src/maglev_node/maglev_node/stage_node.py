@@ -16,7 +16,7 @@ from maglev_node.managed_node import ManagedNode
 from maglev_node.node import NodeError
 from maglev_node.sampling import Sampling
 from maglev_node.stage_parameters import StageNodeParameters
-from maglev_node.topics import CLOCK, CURRENTS, MEASUREMENT
+from maglev_node.topics import CLOCK, CURRENTS, MEASUREMENT, STAGE_PROGRESS
 
 _TIMEOUTS = ('answer_timeout', 'watchdog', 'overrun_limit')
 
@@ -34,6 +34,7 @@ class StageNode(ManagedNode[P], Generic[P, S]):
 
     interface: ClassVar[Mapping[str, str]] = {
         MEASUREMENT: 'published: what the encoders read, each sample',
+        STAGE_PROGRESS: 'published: the same, in flight every sixteenth',
         CURRENTS: 'subscribed: the currents that answer a sample',
         CLOCK: 'published in lockstep: stage time',
         '~/emergency_stop': "std_srvs/Trigger: latch a fault, see the fault's remedy",

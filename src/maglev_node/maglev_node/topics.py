@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from maglev_model.wire import KEY_OF_MESSAGE_TYPE
+from maglev_model.wire import IN_PART, KEY_OF_MESSAGE_TYPE
 from maglev_msgs.msg import ControllerState, Currents, Measurement, PlantState, Reference
 
 MEASUREMENT = 'stage/measurement'
@@ -15,6 +15,8 @@ CURRENTS = 'stage/currents'
 REFERENCE = 'reference'
 CONTROLLER_STATE = 'controller/state'
 TRUE_STATE = 'stage/true_state'
+STAGE_PROGRESS = f'stage{IN_PART}'
+CONTROLLER_PROGRESS = f'controller{IN_PART}'
 DIAGNOSTICS = 'diagnostics'
 CLOCK = 'clock'
 
@@ -33,6 +35,11 @@ KEYS = {
 }
 """Their keys in :data:`maglev_model.wire.TOPIC_TYPES`."""
 
+PROGRESS = {STAGE_PROGRESS: MEASUREMENT, CONTROLLER_PROGRESS: CONTROLLER_STATE}
+"""The topics for whoever need not hear of every sample, with those they are taken from."""
+
+PROGRESS_PERIOD = 16
+"""Samples from one message on them to the next, in flight."""
 
 KEPT = {'lockstep': 16384, 'realtime': 4096}
 """Samples that a publisher keeps for readers that are busy, by mode.

@@ -24,10 +24,11 @@ from maglev_node.mode_check import mode_conflict
 from maglev_node.node import MaglevNode, SourceParameters
 from maglev_node.samples import SampleQueue, SampleWriter
 from maglev_node.topics import (
-    CONTROLLER_STATE,
+    CONTROLLER_PROGRESS,
     KEPT,
-    MEASUREMENT,
+    PROGRESS_PERIOD,
     REFERENCE,
+    STAGE_PROGRESS,
     reference_qos,
     sample_qos,
 )
@@ -53,7 +54,7 @@ class ReferenceNodeParameters(SourceParameters, ReferenceParameters):
     exit_at_end: bool = parameter(False, 'end the process when the run is over', read_only=True)
     lead: int = parameter(
         64,
-        'how far the reference is published ahead',
+        'how far the reference is published ahead, at least',
         unit='samples',
         within=(1, 200),
         read_only=True,
@@ -76,7 +77,7 @@ class ReferenceNodeParameters(SourceParameters, ReferenceParameters):
 
 
 class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
-    """Publishes ``reference`` up to ``lead`` samples ahead of the newest measurement.
+    """Publishes ``reference`` ``lead`` samples ahead of the newest measurement.
 
     It looks at the newest measurement on a short timer instead of being woken by each one. The
     first measurement seen once all watchers are there tells where the platen rests and becomes
@@ -85,8 +86,8 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
 
     interface: ClassVar[Mapping[str, str]] = {
         REFERENCE: 'published: where the platen shall be, ahead of time',
-        MEASUREMENT: 'subscribed: what the encoders read, the newest',
-        CONTROLLER_STATE: 'subscribed: whether the controller follows, the newest',
+        STAGE_PROGRESS: 'subscribed: what the encoders read, the newest',
+        CONTROLLER_PROGRESS: 'subscribed: whether the controller follows, the newest',
         '~/trajectory': 'subscribed: trajectory_msgs/JointTrajectory to follow from a hover',
         '~/lift_off': 'std_srvs/Trigger: start from rest',
         '~/land': 'std_srvs/Trigger: land from wherever the platen is',
@@ -102,13 +103,14 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
             self.get_logger().info(line)
         self._graph = GraphGuard(self, lambda: not self._run.grounded)
         self._graph.claim(REFERENCE, 'reference')
-        self._run = ReferenceRun(self.parameters, self.parameters.lead, self.parameters.autostart)
+        lead = self.parameters.lead + PROGRESS_PERIOD - 1  # of the newest that may be heard of
+        self._run = ReferenceRun(self.parameters, lead, self.parameters.autostart)
         self._watchers = Watchers(self, self.parameters.watchers)
         self._seen = self._reminded = self._looked = time.monotonic()
         self._message = SampleWriter(self, REFERENCE, reference_qos(KEPT[self.parameters.mode]))
         self._message['session'] = secrets.randbits(64) | 1
-        self._measurements = SampleQueue(self, MEASUREMENT, sample_qos(1))
-        self._states = SampleQueue(self, CONTROLLER_STATE, sample_qos(1))
+        self._measurements = SampleQueue(self, STAGE_PROGRESS, sample_qos(1))
+        self._states = SampleQueue(self, CONTROLLER_PROGRESS, sample_qos(1))
         self._lockstep = self.parameters.mode == 'lockstep'
         self._measured: Any = None
         self._published = 0.0  # when, last
@@ -227,7 +229,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
     def _way_back(self, reason: str) -> str:
         """A reason, and the services to call for a lift-off."""
         _, calls = self._run.obstacle()
-        publishers = self.get_publishers_info_by_topic(CONTROLLER_STATE)
+        publishers = self.get_publishers_info_by_topic(CONTROLLER_PROGRESS)
         if not publishers:
             return f'{reason}: nobody publishes {self._states.topic}'
         who = f'{publishers[0].node_namespace.rstrip("/")}/{publishers[0].node_name}'

@@ -232,6 +232,19 @@ def test_a_bag_with_the_runs_of_two_stages_is_refused(
         read(tmp_path / 'bag')
 
 
+def test_what_repeats_a_part_of_the_samples_counts_for_nothing(
+    tmp_path: Path, messages: dict[str, list[bytes]]
+) -> None:
+    """As in a bag of all topics, by somebody else's recorder."""
+    writer = open_bag(tmp_path / 'bag')
+    writer.add_topic('/stage/progress', 'maglev_msgs/msg/Measurement')
+    writer.write('/stage/progress', [(messages['measurement'][0], 1)])
+    writer.write('/stage/measurement', [(each, 1) for each in messages['measurement'][:5]])
+    writer.write('/stage/progress', [(messages['measurement'][4], 1)])
+    writer.close()
+    assert read(tmp_path / 'bag') == ({'measurement': 5}, [])
+
+
 def test_other_messages_of_the_same_name_are_refused(tmp_path: Path) -> None:
     writer = open_bag(tmp_path / 'bag')
     writer.write('/reference', [(b'\x00\x01\x00\x00' + bytes(60), 1)])
