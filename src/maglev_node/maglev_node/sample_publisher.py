@@ -94,10 +94,12 @@ class SamplePublisher:
 
     def destroy(self) -> None:
         """Leave the graph."""
-        truth = [self._true_state] if self._true_state else []
-        writers = [self._measurement, self._progress, *truth]
-        clock = [self._clock_publisher] if self._clock_publisher else []
-        for publisher in [*(writer.publisher for writer in writers), *clock]:
+        publishers = [self._measurement.publisher, self._progress.publisher]
+        if self._true_state is not None:
+            publishers.append(self._true_state.publisher)
+        if self._clock_publisher is not None:
+            publishers.append(self._clock_publisher)
+        for publisher in publishers:
             self._node.destroy_publisher(publisher)
 
     @staticmethod
