@@ -3,10 +3,11 @@
 
     python benchmarks/unit_mutants.py [--modules NAME...] [--jobs J]
 
-All mutants of the modules that have such tests, one to four seconds each: a process that has
-imported the libraries branches off for every mutant and runs the tests with it, compiled code as
-plain Python. What survives may still be noticed by the tests that fly, see mutants.py. The exit
-code is 1 when more than a twentieth survive.
+All mutants of the modules. A process that has imported the libraries branches off for every mutant
+and runs the tests with it. Those of modules that are compiled do not fly, and run them as plain
+Python, one to four seconds each; those of the others fly on emulated boards, with the compiled code
+that set-up or a run has made. What survives may still be noticed by other tests and the campaign,
+see mutants.py. The exit code is 1 when more than a twentieth survive.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import importlib.util
 import os
 import sys
 import time
+from collections.abc import Iterator
 from types import ModuleType
 from typing import NamedTuple
 
@@ -38,30 +40,51 @@ from mutation import (
 
 _LIBRARIES = (
     *('numpy', 'scipy.integrate', 'scipy.linalg', 'scipy.signal', 'scipy.optimize', 'control'),
-    *('pytest', 'hypothesis.strategies', 'yaml'),
+    *('pytest', 'hypothesis.strategies', 'yaml', 'numba'),
 )
 
-_BRIDGE = 'test/hw_bridge/test_'
+
+def _boards(*names: str) -> Iterator[str]:
+    return (f'test/hw_bridge/test_{name}.py' for name in names)
+
+
 TESTS: dict[str, tuple[str, ...]] = {
     'maglev_model.inverse': (
-        *(f'test/model/test_{name}.py' for name in ('inverse', 'attraction_shares')),
+        'test/model/test_inverse.py',
+        'test/model/test_attraction_shares.py',
         'test/model/test_single_motor_inverse.py',
     ),
     'maglev_model.controller_watch': ('test/model/test_controller_watch.py',),
     'maglev_controller.landing': ('test/controller/test_landing.py',),
-    'maglev_hw_bridge.amplifiers': (f'{_BRIDGE}amplifiers.py',),
-    'maglev_hw_bridge.encoders': (f'{_BRIDGE}encoders.py',),
-    'maglev_hw_bridge.observer': (f'{_BRIDGE}observer.py', f'{_BRIDGE}guard.py'),
-    'maglev_hw_bridge.leaps': (f'{_BRIDGE}leaps.py',),
-    'maglev_hw_bridge.standing_still': tuple(
-        f'{_BRIDGE}{name}.py' for name in ('doubts', 'roll_call', 'standing_still')
-    ),
-    'maglev_hw_bridge.guard': (f'{_BRIDGE}watch.py', f'{_BRIDGE}guard.py'),
-    'maglev_hw_bridge.landing': (f'{_BRIDGE}way_down.py',),
+    'maglev_hw_bridge.amplifiers': (*_boards('amplifiers'),),
+    'maglev_hw_bridge.encoders': (*_boards('encoders'),),
+    'maglev_hw_bridge.observer': (*_boards('observer', 'guard'),),
+    'maglev_hw_bridge.leaps': (*_boards('leaps'),),
+    'maglev_hw_bridge.standing_still': (*_boards('doubts', 'roll_call', 'standing_still'),),
+    'maglev_hw_bridge.guard': (*_boards('watch', 'guard'),),
+    'maglev_hw_bridge.landing': (*_boards('way_down'),),
 }
-"""Modules, and their own tests, which do not fly."""
+"""Modules that are compiled, and their own tests, which do not fly."""
 
-_PATIENCE = 60.0  # with the tests of a mutant [s]
+FLYING: dict[str, tuple[str, ...]] = {
+    'maglev_controller.supervision': (
+        'test/controller/test_supervised_parts.py',
+        'test/controller/test_supervision.py',
+        'test/controller/test_foreign_law.py',
+    ),
+    'maglev_hw_bridge.board': (*_boards('driver_calls', 'life_cycle', 'faults', 'commission'),),
+    'maglev_hw_bridge.drivers.quanser': (*_boards('driver_calls', 'faults'),),
+    'maglev_hw_bridge.life_cycle': (*_boards('life_cycle', 'controllers', 'commission'),),
+    'maglev_hw_bridge.stage': (
+        *_boards('life_cycle', 'controllers', 'faults', 'resting', 'sensing', 'landing'),
+        'test/model/test_stage_contract.py',
+    ),
+}
+"""Modules that are not, and theirs."""
+
+EVERY = {**TESTS, **FLYING}
+
+_PATIENCE = 120.0  # with the tests of a mutant [s]
 
 
 class _Changed(importlib.abc.MetaPathFinder, importlib.abc.Loader):
@@ -106,9 +129,10 @@ def _test(module: str, mutant: Mutant | None) -> None:
     try:
         import pytest
 
-        _interpret()
+        if module in TESTS:
+            _interpret()
         options = ('-q', '-x', '-W', 'ignore::RuntimeWarning', '-p', 'no:cacheprovider')
-        code = int(pytest.main([*options, '-p', 'hypothesispytest', *TESTS[module]]))
+        code = int(pytest.main([*options, '-p', 'hypothesispytest', *EVERY[module]]))
     finally:
         os._exit(code)
 
@@ -149,7 +173,7 @@ def judge(module: str, jobs: int) -> tuple[int, int]:
     try:
         _branch(module, None, running)
         if not _next(running)[1]:
-            tests = ' '.join(TESTS[module])
+            tests = ' '.join(EVERY[module])
             sys.exit(f'unit_mutants: without any change these tests fail: {tests}')
         while waiting or running:
             while waiting and len(running) < jobs:
@@ -168,7 +192,7 @@ def judge(module: str, jobs: int) -> tuple[int, int]:
 
 def main() -> int:
     """Entry point."""
-    given = parser_for(__doc__, TESTS).parse_args()
+    given = parser_for(__doc__, EVERY).parse_args()
     heed_signals()
     os.chdir(ROOT)
     for library in _LIBRARIES:

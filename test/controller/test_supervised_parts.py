@@ -103,6 +103,16 @@ def test_a_stage_that_begins_anew_begins_with_references_of_its_own() -> None:
     assert supervisor.references.newest == -1
 
 
+def test_where_a_landing_ends_with_the_stage_only_a_fault_keeps_its_reason() -> None:
+    disabled, stopped = flying(), flying()
+    disabled.disable()
+    stopped.stop('a stop')
+    for supervisor in (disabled, stopped):
+        supervisor.restart()
+    assert (disabled.mode, disabled.reason) == (Mode.WAITING, '')
+    assert (stopped.mode, stopped.reason) == (Mode.FAULT, 'a stop')
+
+
 def test_a_landing_into_a_fault_is_not_reset_and_says_what_it_waits_for() -> None:
     supervisor = flying()
     supervisor.disable()
@@ -158,9 +168,12 @@ def test_learning_looks_ahead_and_learns_in_each_sample_where_it_repeats(phase: 
 
 def test_only_a_new_step_begins_the_models_anew() -> None:
     supervisor = flying(**{'internal_model.restart_at_step': True})
+    learned = []
     for sequence in range(2, 40):
         lead(supervisor, sequence, Phase.STEP, HOVER, 0.0252, segment=0)
-    before = abs(supervisor.regulator.internal_model[0])
+        learned.append(abs(supervisor.regulator.internal_model[0]))
+    before = learned[-1]
+    assert before > 5.0 * learned[2]  # as within a step it goes on
     lead(supervisor, 40, Phase.STEP, HOVER, 0.0252, segment=1)
     assert supervisor.regulator.internal_model[0] == 0.0
     for sequence in range(41, 79):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import signal
 import subprocess
 import sys
@@ -12,7 +13,7 @@ import pytest
 from hil_check import CallError, Module, Trouble
 
 from maglev_hw_bridge.doubts import doubts
-from maglev_hw_bridge.drivers import DriverError, WatchdogError, make_driver
+from maglev_hw_bridge.drivers import DriverError, WatchdogError, make_driver, quanser
 from maglev_hw_bridge.drivers.quanser import QuanserDriver
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_model.parameters import ParameterError, build
@@ -292,6 +293,49 @@ def test_boards_whose_clock_is_a_little_slow_are_not_late(slower: float, late: b
     driver.close()
 
 
+def test_started_again_it_counts_its_ticks_and_their_time_anew() -> None:
+    module, now = Module(), [0.0]
+    driver = QuanserDriver(BridgeParameters(), module, lambda: now[0], module.sleep)
+    assert (driver.late, driver.stop_pressed) == (0.0, False)
+    driver.open()
+    driver.start()
+    run(driver, 3)
+    now[0] = 0.5  # it stood still before the last sample
+    run(driver, 1)
+    assert driver.late == pytest.approx(0.499, abs=1e-5)
+    driver.stop()
+    now[0] = 20.0
+    driver.start()
+    assert driver.late == 0.0
+    run(driver, 1)
+    assert driver.late == 0.0
+    now[0] += 0.003
+    run(driver, 1)
+    assert driver.late == pytest.approx(0.002, abs=1e-5)
+    driver.close()
+
+
+def test_whatever_was_put_out_before_it_starts_with_no_current() -> None:
+    module = Module(offset=0.3)
+    driver = driver_on(module, amplifier__offset=[0.3] * 12)
+    driver.open()
+    for card in module.cards:
+        card.volts[:6] = 2.0
+    driver.start()
+    for card in module.cards:
+        assert card.volts[:6].tolist() == [0.3] * 6
+    driver.close()
+
+
+def test_with_the_vendors_module_its_driver_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    module = Module()
+    monkeypatch.setattr(importlib, 'import_module', {'quanser.hardware': module}.__getitem__)
+    driver = quanser.make(BridgeParameters(), realtime=True)
+    driver.open()
+    assert [card.open for card in module.cards] == [True, True]
+    driver.close()
+
+
 def test_it_gives_up_on_a_call_that_is_interrupted_for_ever() -> None:
     module = Module()
     driver = driver_on(module)
@@ -359,9 +403,10 @@ def test_enable_output_and_stop_input() -> None:
     assert module.enabled
     driver.stop()
     assert not module.enabled
-    module.stop_level = 0
-    driver.counts(np.zeros(6, dtype=np.int32))
-    assert not driver.stop_pressed
+    for level in (0, 1, 0):
+        module.stop_level = level
+        driver.counts(np.zeros(6, dtype=np.int32))
+        assert driver.stop_pressed == bool(level)
     driver.close()
 
 
