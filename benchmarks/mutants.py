@@ -43,7 +43,10 @@ from mutation import (
 _CAMPAIGN = ('test/study/faults/test_campaign.py',)
 _BRIDGE = (
     *(f'test/hw_bridge/test_{name}.py' for name in ('encoders', 'leaps', 'doubts', 'roll_call')),
-    *(f'test/hw_bridge/test_{name}.py' for name in ('standing_still', 'watch', 'observer')),
+    *(
+        f'test/hw_bridge/test_{name}.py'
+        for name in ('standing_still', 'watch', 'observer', 'board')
+    ),
     *(f'test/hw_bridge/test_{name}.py' for name in ('way_down', 'unseen', 'rough_rig')),
     *(f'test/hw_bridge/test_{name}.py' for name in ('amplifiers', 'guard', 'knock', 'resting')),
     *(f'test/hw_bridge/test_{name}.py' for name in ('life_cycle', 'landing')),

@@ -72,9 +72,9 @@ FLYING: dict[str, tuple[str, ...]] = {
         'test/controller/test_supervision.py',
         'test/controller/test_foreign_law.py',
     ),
-    'maglev_hw_bridge.board': (*_boards('driver_calls', 'life_cycle', 'faults', 'commission'),),
-    'maglev_hw_bridge.drivers.quanser': (*_boards('driver_calls', 'faults'),),
-    'maglev_hw_bridge.life_cycle': (*_boards('life_cycle', 'controllers', 'commission'),),
+    'maglev_hw_bridge.board': (*_boards('board', 'driver_calls'),),
+    'maglev_hw_bridge.drivers.quanser': (*_boards('driver_calls', 'board'),),
+    'maglev_hw_bridge.life_cycle': (*_boards('life_cycle'),),
     'maglev_hw_bridge.stage': (
         *_boards('life_cycle', 'controllers', 'faults', 'resting', 'sensing', 'landing'),
         'test/model/test_stage_contract.py',
