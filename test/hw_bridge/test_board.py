@@ -92,6 +92,17 @@ def test_a_watchdog_that_does_not_answer_has_not_expired() -> None:
     assert not isinstance(raised.value, WatchdogError)
 
 
+@pytest.mark.parametrize('number', [0, 1])
+def test_a_call_that_an_expired_watchdog_refuses_is_told_as_that(number: int) -> None:
+    module = Module()
+    driver = QuanserDriver(BridgeParameters(), module, lambda: 0.0, module.sleep)
+    driver.open()
+    driver.start()
+    module.cards[number].expire()
+    with pytest.raises(WatchdogError, match='watchdog expired'):
+        driver.enable()
+
+
 def test_a_board_that_is_not_open_is_safe() -> None:
     board = Board(BridgeParameters(), 0)
     assert board.make_safe() == []
