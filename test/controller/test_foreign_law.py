@@ -413,6 +413,16 @@ def test_in_flight_the_object_stays_and_on_the_ground_it_is_made_anew(flight: Fl
     assert supervisor.regulator.foreign is None
 
 
+@pytest.mark.parametrize('hurried', [True, False])
+def test_what_was_designed_apart_is_made_where_it_flies(hurried: bool) -> None:
+    supervisor = Supervisor(parameters(), hurried=hurried)
+    regulator = Regulator(parameters())
+    regulator.foreign = None  # as an object that cannot go to another process
+    supervisor.adopt(regulator, tuple(np.eye(regulator.arrays.xi.shape[1]) for _ in range(5)))
+    assert supervisor.regulator.foreign is not None
+    assert supervisor.regulator.foreign.hurried is hurried
+
+
 def designed_apart(supervisor: Supervisor, wanted: ControllerParameters) -> tuple[Any, Any]:
     """What the other process designs."""
     process: DesignProcess = supervisor.redesign(wanted)
