@@ -90,7 +90,7 @@ def test_lift_off_ellipse_landing(nodes: Nodes, watching: Observer) -> None:
     }.items():
         numbers = [message.sequence for message in watching.messages[topic]]
         assert set(numbers) <= set(due)
-        assert len(numbers) > 0.9 * len(due)  # of which only the newest is sure to come
+        assert len(numbers) > 0.5 * len(due)  # of which only the newest is sure to come
         assert len(numbers) < 0.5 * len(modes)
     assert ControllerState.FAULT not in modes
     assert ControllerState.LANDING not in modes
