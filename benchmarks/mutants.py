@@ -52,6 +52,7 @@ _BRIDGE = (
     *(f'test/hw_bridge/test_{name}.py' for name in ('life_cycle', 'landing')),
     'test/model/test_stage_contract.py',
     *(f'test/hw_bridge/test_{name}.py' for name in ('faults', 'sensing', 'driver_calls')),
+    'test/hw_bridge/test_boards_that_fail.py',
     'test/study/faults/test_judge.py',
     *(f'test/hw_bridge/test_{name}.py' for name in ('controllers', 'commission')),
 )

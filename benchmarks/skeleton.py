@@ -34,6 +34,7 @@ from maglev_node.topics import (
     STAGE_PROGRESS,
     TRUE_STATE,
     sample_qos,
+    sampled,
 )
 
 PARTS = ('watchers', 'stage', 'controller', 'reference')
@@ -48,14 +49,14 @@ class Part:
         self.node = PollingNode(name)
         self.ticks: list[float] = []
         self._out: dict[str, tuple[Any, Outgoing]] = {}
-        self._read = {topic: Incoming(KEYS[_kind(topic)]).read for topic in (*KEYS, *PROGRESS)}
+        self._read = {topic: Incoming(KEYS[sampled(topic)]).read for topic in (*KEYS, *PROGRESS)}
         self._sequence = self._newest = 0
         self._sent = 0.0
 
     def publish(self, *topics: str) -> None:
         """Have publishers."""
         for topic in topics:
-            kind, qos = _kind(topic), sample_qos(1) if topic in PROGRESS else sample_qos()
+            kind, qos = sampled(topic), sample_qos(1) if topic in PROGRESS else sample_qos()
             publisher = self.node.create_publisher(SAMPLE_TOPICS[kind], topic, qos)
             self._out[topic] = publisher, Outgoing(KEYS[kind], 'stage')
 
@@ -71,7 +72,7 @@ class Part:
     def taps(self, depth: int, *topics: str) -> list[PolledSubscription]:
         """Queues that are looked at now and then."""
         return [
-            self.node.poll(topic, SAMPLE_TOPICS[_kind(topic)], sample_qos(depth), raw=True)
+            self.node.poll(topic, SAMPLE_TOPICS[sampled(topic)], sample_qos(depth), raw=True)
             for topic in topics
         ]
 
@@ -155,10 +156,6 @@ class Part:
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             executor.spin_until_future_complete(never, timeout_sec=0.1)
-
-
-def _kind(topic: str) -> str:
-    return PROGRESS.get(topic, topic)
 
 
 def tick(seconds: float) -> float:

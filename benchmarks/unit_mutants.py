@@ -72,8 +72,8 @@ FLYING: dict[str, tuple[str, ...]] = {
         'test/controller/test_supervision.py',
         'test/controller/test_foreign_law.py',
     ),
-    'maglev_hw_bridge.board': (*_boards('board', 'driver_calls'),),
-    'maglev_hw_bridge.drivers.quanser': (*_boards('driver_calls', 'board'),),
+    'maglev_hw_bridge.board': (*_boards('board', 'boards_that_fail', 'driver_calls'),),
+    'maglev_hw_bridge.drivers.quanser': (*_boards('driver_calls', 'boards_that_fail', 'board'),),
     'maglev_hw_bridge.life_cycle': (*_boards('life_cycle'),),
     'maglev_hw_bridge.stage': (
         *_boards('life_cycle', 'controllers', 'faults', 'resting', 'sensing', 'landing'),

@@ -30,7 +30,7 @@ def ranks():
 
 seen = [ranks()]
 for messages in json.loads(sys.argv[1]):
-    node.take_rank(bytes.fromhex(message) for message in messages)
+    node.adapt_priority(bytes.fromhex(message) for message in messages)
     seen.append(ranks())
 node.close()
 seen.append(ranks())

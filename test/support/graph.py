@@ -28,7 +28,7 @@ from std_srvs.srv import SetBool, Trigger
 from maglev_model.wire import record_type
 from maglev_node.dds import prepare_middleware
 from maglev_node.polling import PolledSubscription, PollingNode
-from maglev_node.topics import KEYS, PROGRESS, SAMPLE_TOPICS
+from maglev_node.topics import KEYS, SAMPLE_TOPICS, sampled
 
 ROOT = Path(__file__).resolve().parents[2]
 PARAMS = ROOT / 'params'
@@ -178,8 +178,7 @@ class Heard(Sequence[Any]):
     """Messages of a topic as they came; each is decoded when somebody looks at it."""
 
     def __init__(self, topic: str) -> None:
-        sampled = PROGRESS.get(topic, topic)
-        self._kind, self._key = SAMPLE_TOPICS[sampled], KEYS[sampled]
+        self._kind, self._key = SAMPLE_TOPICS[sampled(topic)], KEYS[sampled(topic)]
         self._held: list[bytes] = []
         self._decoded: dict[int, Any] = {}
 
@@ -229,7 +228,7 @@ class Observer:
         """Keep the messages of these topics from now on."""
         for topic in topics:
             self.messages[topic] = Heard(topic)
-            kind = SAMPLE_TOPICS[PROGRESS.get(topic, topic)]
+            kind = SAMPLE_TOPICS[sampled(topic)]
             self._subscriptions[topic] = self.node.poll(topic, kind, raw=True)
 
     def look(self) -> dict[str, Heard]:

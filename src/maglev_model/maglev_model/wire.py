@@ -113,7 +113,7 @@ TOPIC_TYPES = {
 
 KEY_OF_MESSAGE_TYPE = {topic.message_type: key for key, topic in TOPIC_TYPES.items()}
 
-IN_PART = '/progress'
+PROGRESS_SUFFIX = '/progress'
 """How the names of topics end that repeat a part of another's messages."""
 
 _ENCAPSULATION = b'\x00\x01\x00\x00'  # plain CDR, little endian

@@ -12,7 +12,7 @@ from rclpy.subscription import Subscription
 
 from maglev_model.wire import DecodeError, Incoming, Outgoing
 from maglev_node.polling import PollingNode
-from maglev_node.topics import KEYS, PROGRESS, PROGRESS_PERIOD, SAMPLE_TOPICS, sample_qos
+from maglev_node.topics import KEYS, PROGRESS_PERIOD, SAMPLE_TOPICS, sample_qos, sampled
 
 _FRAME = 'stage'
 
@@ -48,15 +48,12 @@ class ProgressWriter:
     """
 
     def __init__(self, node: Node, topic: str, samples: SampleWriter) -> None:
-        self.publisher = node.create_publisher(SAMPLE_TOPICS[PROGRESS[topic]], topic, sample_qos(1))
+        self.publisher = node.create_publisher(SAMPLE_TOPICS[sampled(topic)], topic, sample_qos(1))
         self._samples = samples
         self._steady = False
 
     def publish(self, sequence: int, *, steady: bool) -> None:
-        """Publish the sample if it is one of each period, or what it tells is not steady.
-
-        Nor is it where that begins.
-        """
+        """Publish each sample until what it tells is steady, then every sixteenth."""
         if not (steady and self._steady) or sequence % PROGRESS_PERIOD == 0:
             self.publisher.publish(self._samples.serialized())
         self._steady = steady
@@ -67,7 +64,7 @@ class SampleReader:
 
     def __init__(self, node: Node, topic: str) -> None:
         self._node, self._topic = node, topic
-        self._incoming = Incoming(KEYS[PROGRESS.get(topic, topic)])
+        self._incoming = Incoming(KEYS[sampled(topic)])
 
     def read(self, message: bytes) -> Any:
         """A named tuple of the header's ``stamp`` [ns] and the message's fields, or None."""
@@ -102,8 +99,7 @@ class SampleQueue:
     """A topic of samples, or of their progress, whose messages wait until they are taken."""
 
     def __init__(self, node: PollingNode, topic: str, qos: QoSProfile | None = None) -> None:
-        kind = SAMPLE_TOPICS[PROGRESS.get(topic, topic)]
-        self._queue = node.poll(topic, kind, qos, raw=True)
+        self._queue = node.poll(topic, SAMPLE_TOPICS[sampled(topic)], qos, raw=True)
         self._reader = SampleReader(node, topic)
         self.topic = self._queue.topic
 

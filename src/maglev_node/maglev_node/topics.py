@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from maglev_model.wire import IN_PART, KEY_OF_MESSAGE_TYPE
+from maglev_model.wire import KEY_OF_MESSAGE_TYPE, PROGRESS_SUFFIX
 from maglev_msgs.msg import ControllerState, Currents, Measurement, PlantState, Reference
 
 MEASUREMENT = 'stage/measurement'
@@ -15,8 +15,8 @@ CURRENTS = 'stage/currents'
 REFERENCE = 'reference'
 CONTROLLER_STATE = 'controller/state'
 TRUE_STATE = 'stage/true_state'
-STAGE_PROGRESS = f'stage{IN_PART}'
-CONTROLLER_PROGRESS = f'controller{IN_PART}'
+STAGE_PROGRESS = f'stage{PROGRESS_SUFFIX}'
+CONTROLLER_PROGRESS = f'controller{PROGRESS_SUFFIX}'
 DIAGNOSTICS = 'diagnostics'
 CLOCK = 'clock'
 
@@ -40,6 +40,12 @@ PROGRESS = {STAGE_PROGRESS: MEASUREMENT, CONTROLLER_PROGRESS: CONTROLLER_STATE}
 
 PROGRESS_PERIOD = 16
 """Samples from one message on them to the next, in flight."""
+
+
+def sampled(topic: str) -> str:
+    """The sample topic whose messages are on a topic: itself, but for those of progress."""
+    return PROGRESS.get(topic, topic)
+
 
 KEPT = {'lockstep': 16384, 'realtime': 4096}
 """Samples that a publisher keeps for readers that are busy, by mode.

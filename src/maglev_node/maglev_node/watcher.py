@@ -42,16 +42,16 @@ class WatcherNode(MaglevNode[P]):
 
     def __init__(self, name: str, parameter_table: type[P], **node_options: Any) -> None:
         super().__init__(name, parameter_table, **node_options)
-        self._ranked = False
+        self._adapted = False
 
-    def take_rank(self, measurements: Iterable[bytes]) -> None:
-        """Take the place in the loop's mode; ``measurements`` are serialized, none is needed."""
+    def adapt_priority(self, measurements: Iterable[bytes]) -> None:
+        """Adapt to the mode of the stage once one of the serialized ``measurements`` tells it."""
         for message in measurements:
-            if self._ranked:
+            if self._adapted:
                 return
             with suppress(DecodeError):
                 measured: Any = Incoming(KEYS[MEASUREMENT]).read(message)
-                self._ranked = True
+                self._adapted = True
                 if measured.lockstep:
                     realtime.take_niceness(_NICENESS)
                 elif self.parameters.realtime_priority > 0:

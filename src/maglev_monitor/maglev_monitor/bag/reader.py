@@ -15,7 +15,7 @@ from rosbags.rosbag2.errors import ReaderError
 from rosbags.typesys import Stores, get_typestore
 
 from maglev_model.progress import Progress
-from maglev_model.wire import IN_PART, KEY_OF_MESSAGE_TYPE
+from maglev_model.wire import KEY_OF_MESSAGE_TYPE, PROGRESS_SUFFIX
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.mcap_file import MAGIC_BYTES, McapFile, TopicMessages
 from maglev_monitor.metrics.decoding import Records, decode
@@ -138,7 +138,7 @@ class Bag:
         diagnostics: list[Diagnostic] = []
         for topic, message_type, data in messages:
             key = KEY_OF_MESSAGE_TYPE.get(message_type)
-            if key is not None and not topic.endswith(IN_PART):
+            if key is not None and not topic.endswith(PROGRESS_SUFFIX):
                 self._only(key, topic)
                 serialized[key] += data
             elif message_type == _DIAGNOSTICS:

@@ -122,7 +122,7 @@ class RecorderNode(WatcherNode[RecorderParameters]):
             for topic, tap in self._taps.items():
                 taken = list(tap.take())
                 if topic == MEASUREMENT:
-                    self.take_rank(message for message, _ in taken)
+                    self.adapt_priority(message for message, _ in taken)
                 messages = self._log_times.of(type_name(TOPICS[topic]), taken)
                 if not messages:
                     continue

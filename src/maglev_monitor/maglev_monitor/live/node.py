@@ -102,7 +102,7 @@ class MonitorNode(WatcherNode[MonitorParameters]):
         if self._concluded:
             return
         arrived = self._arrived()
-        self.take_rank(arrived[KEYS[topics.MEASUREMENT]])
+        self.adapt_priority(arrived[KEYS[topics.MEASUREMENT]])
         try:
             self._watch.add(arrived)
         except DecodeError as error:
