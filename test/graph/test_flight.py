@@ -84,13 +84,15 @@ def test_lift_off_ellipse_landing(nodes: Nodes, watching: Observer) -> None:
         assert numbers == list(range(len(numbers))), f'{topic} lost or repeated samples'
     states = watching.messages[CONTROLLER_STATE]
     modes = [message.mode for message in states]
-    for topic, due in {
-        STAGE_PROGRESS: in_part(watching.messages[MEASUREMENT], lambda m: m.controller != 0),
-        CONTROLLER_PROGRESS: in_part(states, lambda m: m.mode == ControllerState.REGULATING),
-    }.items():
+    for topic, messages, steady in (
+        (STAGE_PROGRESS, watching.look()[MEASUREMENT], lambda m: m.controller != 0),
+        (CONTROLLER_PROGRESS, states, lambda m: m.mode == ControllerState.REGULATING),
+    ):
+        due = in_part(messages, steady)
         numbers = [message.sequence for message in watching.messages[topic]]
+        numbers = [number for number in numbers if number <= messages[-1].sequence]  # one may lead
         assert set(numbers) <= set(due)
-        assert len(numbers) > 0.5 * len(due)  # of which only the newest is sure to come
+        assert len(numbers) > 0.2 * len(due)  # of which only the newest is sure to come
         assert len(numbers) < 0.5 * len(modes)
     assert ControllerState.FAULT not in modes
     assert ControllerState.LANDING not in modes
