@@ -49,7 +49,7 @@ _BRIDGE = (
     ),
     *(f'test/hw_bridge/test_{name}.py' for name in ('way_down', 'unseen', 'rough_rig')),
     *(f'test/hw_bridge/test_{name}.py' for name in ('amplifiers', 'guard', 'knock', 'resting')),
-    *(f'test/hw_bridge/test_{name}.py' for name in ('life_cycle', 'landing')),
+    *(f'test/hw_bridge/test_{name}.py' for name in ('life_cycle', 'memory', 'landing')),
     'test/model/test_stage_contract.py',
     *(f'test/hw_bridge/test_{name}.py' for name in ('faults', 'sensing', 'driver_calls')),
     'test/hw_bridge/test_boards_that_fail.py',

@@ -33,7 +33,7 @@ from witness import SHORT, Witness
 ROOT = Path(__file__).resolve().parents[1]
 SUPPORT = ROOT / 'test' / 'support'
 BUSY = 'while True: pass'
-FILLING = 'import time\nwhile True: b"x" * 400_000_000; time.sleep(0.05)'  # bytes(n) touches no page
+FILLING = 'import time\nwhile True: b"x" * 400_000_000; time.sleep(0.05)'
 TALKING = """
 import rclpy
 from std_msgs.msg import ByteMultiArray

@@ -74,9 +74,9 @@ FLYING: dict[str, tuple[str, ...]] = {
     ),
     'maglev_hw_bridge.board': (*_boards('board', 'boards_that_fail', 'driver_calls'),),
     'maglev_hw_bridge.drivers.quanser': (*_boards('driver_calls', 'boards_that_fail', 'board'),),
-    'maglev_hw_bridge.life_cycle': (*_boards('life_cycle'),),
+    'maglev_hw_bridge.life_cycle': (*_boards('life_cycle', 'memory'),),
     'maglev_hw_bridge.stage': (
-        *_boards('life_cycle', 'controllers', 'faults', 'resting', 'sensing', 'landing'),
+        *_boards('life_cycle', 'memory', 'controllers', 'faults', 'resting', 'sensing', 'landing'),
         'test/model/test_stage_contract.py',
     ),
 }

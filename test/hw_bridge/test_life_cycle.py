@@ -2,46 +2,26 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from bridge_flight import HOME, Flight, hover
+from bridge_flight import Flight, hover
+from wired import OFFSET, bridge
 
-from maglev_hw_bridge.drivers import DriverError
 from maglev_hw_bridge.drivers.emulated import EmulatedBoards
-from maglev_hw_bridge.drivers.quanser import QuanserDriver
 from maglev_hw_bridge.encoders import HomingError
-from maglev_hw_bridge.memory import Memory, memory_file
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.stage import BridgeStage, Mode
 from maglev_model.parameters import ParameterError, build
-from maglev_model.stage import Fault, StageError
+from maglev_model.stage import StageError
 
-OFFSET = [0.3, -0.2] * 6  # what makes no current [V]
-WIRED = {
-    **HOME,
-    'boards.stop_input': 0,
-    'boards.enable_output': 1,
-    'amplifier.offset': OFFSET,
-    'emulation.wiring.offset': OFFSET,
-}
 LOWER_STOP, UPPER_STOP = 0.031, 0.018
 CALLS = (
     'configure', 'home', 'activate', 'read', 'write', 'hold', 'land', 'stop', 'reset', 'resume',
     'deactivate', 'close',
 )  # fmt: skip
-
-
-def bridge(**overrides: object) -> tuple[BridgeStage, EmulatedBoards]:
-    names = {name.replace('__', '.'): value for name, value in overrides.items()}
-    parameters = build(BridgeParameters, {**WIRED, **names})
-    boards = EmulatedBoards(parameters)
-    driver = QuanserDriver(parameters, boards, boards.now, boards.sleep)
-    return BridgeStage(parameters, driver=driver), boards
 
 
 def in_mode(mode: Mode) -> tuple[BridgeStage, EmulatedBoards]:
@@ -420,155 +400,3 @@ def test_a_cut_is_put_out_before_it_is_explained(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr('maglev_hw_bridge.faults.consequence_of_cut', explain)
     flight.stage._raise_fault('encoder', 'for a test', 'nothing', cut=True)
     assert seen == [(False, False)]
-
-
-# -- what outlasts the process -------------------------------------------------------------------
-
-
-def kept(path: Path, **overrides: object) -> BridgeStage:
-    return bridge(boards__memory=str(path), **overrides)[0]
-
-
-def cold(stage: BridgeStage) -> BridgeStage:
-    stage._cooling_since -= 60.0
-    return stage
-
-
-def test_emulated_boards_keep_nothing_and_real_ones_a_file(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.setenv('XDG_STATE_HOME', str(tmp_path))
-    assert memory_file(BridgeParameters()) is None
-    real = memory_file(build(BridgeParameters, {'driver': 'quanser'}))
-    assert real == tmp_path / 'maglev-stage' / 'q8-0-1.json'
-
-
-def test_load_and_fault_outlast_the_process(tmp_path: Path) -> None:
-    path = tmp_path / 'state' / 'boards.json'
-    first = kept(path)
-    first.configure()
-    cold(first).activate()
-    first.stop('for a reason')
-    first.amplifiers.arrays.load[3] = 0.9
-    first.close()
-    second = kept(path)
-    second.configure()
-    assert second.fault == first.fault
-    assert 0.5 < second.amplifiers.load < 0.9
-    with pytest.raises(StageError, match='for a reason'):
-        second.activate()
-    cold(second)
-    assert second.reset()[0]
-    assert second.mode is Mode.READY
-    second.memory.release()  # as the system does for a process that is killed, here inactive
-    third = kept(path)
-    third.configure()
-    assert third.fault is None
-    third.close()
-
-
-def test_what_is_killed_in_flight_is_a_fault_and_hot(tmp_path: Path) -> None:
-    path = tmp_path / 'boards.json'
-    first = kept(path)
-    first.configure()
-    cold(first).activate()
-    first.memory.release()  # as the system does for a process that is killed
-    second = kept(path)
-    second.configure()
-    assert second.fault is not None
-    assert second.fault.kind == 'ended'
-    assert second.amplifiers.load > 0.9
-    assert 'hot' in second.reset()[1]
-    assert cold(second).reset()[0]
-    second.activate()
-    second.close()
-
-
-@pytest.mark.parametrize(
-    'content',
-    ['', '{', '[]', '{"active": false}', '{"active": false, "load": [1], "time": 0, "fault": null}',
-     '{"active": false, "load": "hot", "time": 0, "fault": 3}', b'\xff\xfe',
-     '{"active": false, "load": [NaN,0,0,0,0,0,0,0,0,0,0,0], "time": 0, "fault": null}'],
-)  # fmt: skip
-def test_a_damaged_file_is_a_fault_and_hot(tmp_path: Path, content: str | bytes) -> None:
-    path = tmp_path / 'boards.json'
-    path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    stage = kept(path)
-    stage.configure()
-    assert stage.fault is not None
-    assert 'damaged' in stage.fault.reason
-    assert stage.amplifiers.load > 0.9
-    assert cold(stage).reset()[0]
-    stage.close()
-    assert json.loads(path.read_text())['fault'] is None
-
-
-def test_without_a_file_the_amplifiers_count_as_hot(tmp_path: Path) -> None:
-    stage = kept(tmp_path / 'boards.json')
-    stage.configure()
-    assert stage.fault is None
-    with pytest.raises(StageError, match=r'hot.*for 0\.\d s'):
-        stage.activate()
-    cold(stage).activate()
-    stage.close()
-
-
-@pytest.mark.parametrize(('passed', 'left'), [(2.0, 0.5 * np.exp(-1.0)), (-3600.0, 0.5)])
-def test_the_wall_clock_cools_and_never_heats(tmp_path: Path, passed: float, left: float) -> None:
-    parameters = build(BridgeParameters, {'boards.memory': str(tmp_path / 'boards.json')})
-    now = 1000.0
-    memory = Memory(parameters, lambda: now)
-    memory.keep(np.full(12, 0.5), None, active=False)
-    now += passed
-    assert memory.recall().load == pytest.approx(np.full(12, left))
-
-
-def test_a_fault_is_kept_as_it_was(tmp_path: Path) -> None:
-    memory = Memory(build(BridgeParameters, {'boards.memory': str(tmp_path / 'boards.json')}))
-    fault = Fault('board', 'a "reason"\n', 'µ', True)
-    memory.keep(np.zeros(12), fault, active=False)
-    assert memory.recall().fault == fault
-    assert [path.name for path in tmp_path.iterdir()] == ['boards.json']
-
-
-def test_two_bridges_cannot_have_the_same_boards(tmp_path: Path) -> None:
-    path = tmp_path / 'boards.json'
-    first, second = kept(path), kept(path)
-    first.configure()
-    with pytest.raises(StageError, match='in use'):
-        second.configure()
-    assert not second.driver._boards[0].card  # type: ignore[attr-defined]
-    first.close()
-    second.configure()
-    second.close()
-
-
-def test_a_place_that_cannot_be_written_is_said(tmp_path: Path) -> None:
-    (tmp_path / 'file').write_text('')
-    stage = kept(tmp_path / 'file' / 'boards.json')
-    with pytest.raises(StageError, match=r"parameter 'boards\.memory'"):
-        stage.configure()
-    assert stage.mode is Mode.CLOSED
-
-
-@pytest.mark.parametrize('call', ['open', 'counts'])
-@pytest.mark.parametrize('error', [DriverError('no boards'), OSError('something else')])
-def test_whatever_opening_raises_gives_everything_back(
-    tmp_path: Path, error: Exception, call: str
-) -> None:
-    stage = kept(tmp_path / 'boards.json')
-    closed: list[bool] = []
-
-    def fails(*_: object) -> None:
-        raise error
-
-    closes = stage.driver.close
-    setattr(stage.driver, call, fails)
-    stage.driver.close = lambda: closed.append(True) or closes()  # type: ignore[method-assign]
-    with pytest.raises(StageError if isinstance(error, DriverError) else OSError):
-        stage.configure()
-    assert closed
-    assert stage.mode is Mode.CLOSED
-    again = kept(tmp_path / 'boards.json')
-    again.configure()  # nobody holds them
-    again.close()
