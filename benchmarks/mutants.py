@@ -31,6 +31,7 @@ from mutation import (
     INTERRUPTED,
     ROOT,
     Mutant,
+    bridge_tests,
     difference,
     edits_of,
     heed_signals,
@@ -42,19 +43,13 @@ from mutation import (
 
 _CAMPAIGN = ('test/study/faults/test_campaign.py',)
 _BRIDGE = (
-    *(f'test/hw_bridge/test_{name}.py' for name in ('encoders', 'leaps', 'doubts', 'roll_call')),
-    *(
-        f'test/hw_bridge/test_{name}.py'
-        for name in ('standing_still', 'watch', 'observer', 'board')
-    ),
-    *(f'test/hw_bridge/test_{name}.py' for name in ('way_down', 'unseen', 'rough_rig')),
-    *(f'test/hw_bridge/test_{name}.py' for name in ('amplifiers', 'guard', 'knock', 'resting')),
-    *(f'test/hw_bridge/test_{name}.py' for name in ('life_cycle', 'memory', 'landing')),
+    *bridge_tests('encoders', 'leaps', 'doubts', 'roll_call', 'standing_still', 'watch'),
+    *bridge_tests('observer', 'board', 'way_down', 'unseen', 'rough_rig', 'amplifiers', 'guard'),
+    *bridge_tests('knock', 'resting', 'life_cycle', 'memory', 'landing'),
     'test/model/test_stage_contract.py',
-    *(f'test/hw_bridge/test_{name}.py' for name in ('faults', 'sensing', 'driver_calls')),
-    'test/hw_bridge/test_boards_that_fail.py',
+    *bridge_tests('faults', 'sensing', 'driver_calls', 'boards_that_fail'),
     'test/study/faults/test_judge.py',
-    *(f'test/hw_bridge/test_{name}.py' for name in ('controllers', 'commission')),
+    *bridge_tests('controllers', 'commission'),
 )
 _CONTROLLER = ('test/controller', 'test/study/test_closed_loop_figures.py')
 _INVERSE = ('test/model', 'test/reference/test_currents.py', 'test/study/test_single_motor.py')

@@ -40,6 +40,11 @@ _OPPOSITES: dict[type[ast.AST], tuple[type[ast.AST], ...]] = {
 Edit = Callable[[], None]
 
 
+def bridge_tests(*names: str) -> tuple[str, ...]:
+    """Files of the bridge's tests."""
+    return tuple(f'test/hw_bridge/test_{name}.py' for name in names)
+
+
 class Mutant(NamedTuple):
     """One changed source."""
 

@@ -20,7 +20,6 @@ import importlib.util
 import os
 import sys
 import time
-from collections.abc import Iterator
 from types import ModuleType
 from typing import NamedTuple
 
@@ -29,6 +28,7 @@ from mutation import (
     INTERRUPTED,
     ROOT,
     Mutant,
+    bridge_tests,
     difference,
     edits_of,
     heed_signals,
@@ -44,10 +44,6 @@ _LIBRARIES = (
 )
 
 
-def _boards(*names: str) -> Iterator[str]:
-    return (f'test/hw_bridge/test_{name}.py' for name in names)
-
-
 TESTS: dict[str, tuple[str, ...]] = {
     'maglev_model.inverse': (
         'test/model/test_inverse.py',
@@ -56,13 +52,13 @@ TESTS: dict[str, tuple[str, ...]] = {
     ),
     'maglev_model.controller_watch': ('test/model/test_controller_watch.py',),
     'maglev_controller.landing': ('test/controller/test_landing.py',),
-    'maglev_hw_bridge.amplifiers': (*_boards('amplifiers'),),
-    'maglev_hw_bridge.encoders': (*_boards('encoders'),),
-    'maglev_hw_bridge.observer': (*_boards('observer', 'guard'),),
-    'maglev_hw_bridge.leaps': (*_boards('leaps'),),
-    'maglev_hw_bridge.standing_still': (*_boards('doubts', 'roll_call', 'standing_still'),),
-    'maglev_hw_bridge.guard': (*_boards('watch', 'guard'),),
-    'maglev_hw_bridge.landing': (*_boards('way_down'),),
+    'maglev_hw_bridge.amplifiers': bridge_tests('amplifiers'),
+    'maglev_hw_bridge.encoders': bridge_tests('encoders'),
+    'maglev_hw_bridge.observer': bridge_tests('observer', 'guard'),
+    'maglev_hw_bridge.leaps': bridge_tests('leaps'),
+    'maglev_hw_bridge.standing_still': bridge_tests('doubts', 'roll_call', 'standing_still'),
+    'maglev_hw_bridge.guard': bridge_tests('watch', 'guard'),
+    'maglev_hw_bridge.landing': bridge_tests('way_down'),
 }
 """Modules that are compiled, and their own tests, which do not fly."""
 
@@ -72,11 +68,15 @@ FLYING: dict[str, tuple[str, ...]] = {
         'test/controller/test_supervision.py',
         'test/controller/test_foreign_law.py',
     ),
-    'maglev_hw_bridge.board': (*_boards('board', 'boards_that_fail', 'driver_calls'),),
-    'maglev_hw_bridge.drivers.quanser': (*_boards('driver_calls', 'boards_that_fail', 'board'),),
-    'maglev_hw_bridge.life_cycle': (*_boards('life_cycle', 'memory'),),
+    'maglev_hw_bridge.board': bridge_tests('board', 'boards_that_fail', 'driver_calls'),
+    'maglev_hw_bridge.drivers.quanser': (
+        *bridge_tests('driver_calls', 'boards_that_fail', 'board'),
+    ),
+    'maglev_hw_bridge.life_cycle': bridge_tests('life_cycle', 'memory'),
     'maglev_hw_bridge.stage': (
-        *_boards('life_cycle', 'memory', 'controllers', 'faults', 'resting', 'sensing', 'landing'),
+        *bridge_tests(
+            'life_cycle', 'memory', 'controllers', 'faults', 'resting', 'sensing', 'landing'
+        ),
         'test/model/test_stage_contract.py',
     ),
 }

@@ -89,8 +89,8 @@ def test_lift_off_ellipse_landing(nodes: Nodes, watching: Observer) -> None:
         (CONTROLLER_PROGRESS, states, lambda m: m.mode == ControllerState.REGULATING),
     ):
         due = in_part(messages, steady)
-        numbers = [message.sequence for message in watching.messages[topic]]
-        numbers = [number for number in numbers if number <= messages[-1].sequence]  # one may lead
+        told, newest = watching.messages[topic], messages[-1].sequence
+        numbers = [m.sequence for m in told if m.sequence <= newest]  # one may lead
         assert set(numbers) <= set(due)
         assert len(numbers) > 0.2 * len(due)  # of which only the newest is sure to come
         assert len(numbers) < 0.5 * len(modes)

@@ -6,20 +6,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from driven import LINES, bridge_parameters, started
 from hil_check import Card, Module, Trouble
 
 from maglev_hw_bridge.board import Board
 from maglev_hw_bridge.drivers import DriverError, WatchdogError
-from maglev_hw_bridge.drivers.quanser import QuanserDriver
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_model.parameters import build
-
-LINES = {'boards.stop_input': 3, 'boards.enable_output': 5}
 
 
 def board_on(module: Module, number: int = 0, **names: object) -> tuple[Board, Card]:
     """A board that was opened, and the card that it stands for."""
-    board = Board(build(BridgeParameters, names), number)
+    board = Board(bridge_parameters(**names), number)
     board.card = module.HIL('q8', str(number))  # type: ignore[call-arg]
     return board, module.cards[-1]
 
@@ -83,9 +80,7 @@ def test_the_enable_line_is_off_from_when_it_is_driven() -> None:
 
 def test_a_watchdog_that_does_not_answer_has_not_expired() -> None:
     module = Module()
-    driver = QuanserDriver(BridgeParameters(), module, lambda: 0.0, module.sleep)
-    driver.open()
-    driver.start()
+    driver = started(module)
     module.trouble = Trouble({'task_read_encoder', 'watchdog_is_expired'})
     with pytest.raises(DriverError, match='reading a sample failed') as raised:
         driver.read(np.zeros(6, dtype=np.int32))
@@ -95,9 +90,7 @@ def test_a_watchdog_that_does_not_answer_has_not_expired() -> None:
 @pytest.mark.parametrize('number', [0, 1])
 def test_a_call_that_an_expired_watchdog_refuses_is_told_as_that(number: int) -> None:
     module = Module()
-    driver = QuanserDriver(BridgeParameters(), module, lambda: 0.0, module.sleep)
-    driver.open()
-    driver.start()
+    driver = started(module)
     module.cards[number].expire()
     with pytest.raises(WatchdogError, match='watchdog expired'):
         driver.enable()

@@ -7,18 +7,16 @@ import re
 
 import numpy as np
 import pytest
-from driven import LINES, driver_on, run
+from driven import LINES, driver_on, run, started
 from hil_check import Module, Trouble
 
-from maglev_hw_bridge.drivers import DriverError
+from maglev_hw_bridge.drivers import DriverError, WatchdogError
 
 
 @pytest.mark.parametrize('board', [0, 1])
 def test_a_board_that_cannot_be_told_keeps_its_watchdog(board: int) -> None:
     module = Module(enable_line=5)
-    driver = driver_on(module, **LINES)
-    driver.open()
-    driver.start()
+    driver = started(module, **LINES)
     run(driver)
     module.trouble = Trouble('write_analog', board)
     with pytest.raises(DriverError, match='stopping the boards failed: write_analog failed;'):
@@ -40,9 +38,7 @@ def test_a_board_that_cannot_be_told_keeps_its_watchdog(board: int) -> None:
 
 def test_how_often_a_board_is_told_what_it_does_not_do() -> None:
     module = Module(enable_line=5)
-    driver = driver_on(module, **LINES)
-    driver.open()
-    driver.start()
+    driver = started(module, **LINES)
     for kind, times in (('error', 3), ('interrupted', 3 * 6)):
         module.trouble = Trouble('write_analog', 1, kind=kind)
         before = module.cards[1].calls.count('write_analog')
@@ -64,9 +60,7 @@ def test_a_watchdog_that_was_never_started_is_not_stopped() -> None:
 @pytest.mark.parametrize('board', [0, 1])
 def test_a_board_that_is_held_on_to_is_told_again(board: int) -> None:
     module = Module(enable_line=5)
-    driver = driver_on(module, **LINES)
-    driver.open()
-    driver.start()
+    driver = started(module, **LINES)
     run(driver)
     module.trouble = Trouble('write_analog', board)
 
@@ -85,9 +79,7 @@ def test_a_board_that_is_held_on_to_is_told_again(board: int) -> None:
 
 def test_a_watchdog_that_expired_is_not_cleared_to_disable() -> None:
     module = Module(enable_line=5)
-    driver = driver_on(module, **LINES)
-    driver.open()
-    driver.start()
+    driver = started(module, **LINES)
     for card in module.cards:
         card.expire()
     with contextlib.suppress(DriverError):
@@ -109,9 +101,7 @@ def test_what_says_nothing_is_named_by_its_kind() -> None:
 @pytest.mark.parametrize('directions', [True, False])
 def test_an_enable_line_that_cannot_be_told_is_let_go(directions: bool) -> None:
     module = Module(enable_line=5)
-    driver = driver_on(module, **LINES)
-    driver.open()
-    driver.start()
+    driver = started(module, **LINES)
     assert module.enabled
     refused = {'write_digital'} if directions else {'write_digital', 'set_digital_directions'}
     module.trouble = Trouble(refused, 0)
@@ -128,11 +118,46 @@ def test_an_enable_line_that_cannot_be_told_is_let_go(directions: bool) -> None:
 
 def test_one_failure_does_not_leave_the_enable_line_on() -> None:
     module = Module(enable_line=5)
-    driver = driver_on(module, **LINES)
-    driver.open()
-    driver.start()
+    driver = started(module, **LINES)
     run(driver)
     module.trouble = Trouble('write_digital', 0, times=1)
     driver.stop()
     assert not module.enabled
     assert module.cards[0].calls[-1] == 'watchdog_stop'
+
+
+@pytest.mark.parametrize('got', [0, None, 2])
+def test_a_sample_task_that_has_stopped_is_lost_boards(
+    got: int | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module = Module()
+    driver = started(module)
+    run(driver)
+    monkeypatch.setattr(type(module.cards[0]), 'task_read_encoder', lambda *_: got)
+    with pytest.raises(DriverError, match='sample clock has stopped'):
+        driver.read(np.zeros(6, dtype=np.int32))
+
+
+def test_it_gives_up_on_a_call_that_is_interrupted_for_ever() -> None:
+    module = Module()
+    driver = started(module)
+    module.trouble = Trouble('task_read_encoder', kind='interrupted')
+    with pytest.raises(DriverError, match='interrupted'):
+        driver.read(np.zeros(6, dtype=np.int32))
+    assert module.cards[0].calls.count('task_read_encoder') < 10
+
+
+@pytest.mark.parametrize('board', [0, 1])
+def test_an_expired_watchdog_is_honoured(board: int) -> None:
+    module = Module()
+    driver = started(module)
+    run(driver)
+    module.cards[board].expire()
+    written = [len(card.written) for card in module.cards]
+    with pytest.raises(WatchdogError, match='watchdog expired'):
+        driver.write(np.ones(12))
+    assert [len(card.written) for card in module.cards] == written  # on neither board
+    assert not np.any(module.cards[board].volts[:6])
+    driver.close()
+    assert 'watchdog_clear' in module.cards[board].calls
+    assert not any(card.expired for card in module.cards)

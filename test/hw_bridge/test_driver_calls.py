@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from driven import LINES, driver_on, run
+from driven import LINES, driver_on, run, started
 from hil_check import CallError, Module, Trouble
 
 from maglev_hw_bridge.doubts import doubts
@@ -54,9 +54,7 @@ def test_a_whole_session() -> None:
 
 def test_closing_in_flight_leaves_nothing_behind() -> None:
     module = Module()
-    driver = driver_on(module)
-    driver.open()
-    driver.start()
+    driver = started(module)
     run(driver)
     driver.close()
     for card in module.cards:
@@ -93,29 +91,9 @@ def test_samples_need_an_encoder_on_the_board_whose_clock_paces_them() -> None:
 
 
 @pytest.mark.parametrize('board', [0, 1])
-def test_an_expired_watchdog_is_honoured(board: int) -> None:
-    module = Module()
-    driver = driver_on(module)
-    driver.open()
-    driver.start()
-    run(driver)
-    module.cards[board].expire()
-    written = [len(card.written) for card in module.cards]
-    with pytest.raises(WatchdogError, match='watchdog expired'):
-        driver.write(np.ones(12))
-    assert [len(card.written) for card in module.cards] == written  # on neither board
-    assert not np.any(module.cards[board].volts[:6])
-    driver.close()
-    assert 'watchdog_clear' in module.cards[board].calls
-    assert not any(card.expired for card in module.cards)
-
-
-@pytest.mark.parametrize('board', [0, 1])
 def test_what_a_reload_says_is_enough(board: int) -> None:
     module = Module()
-    driver = driver_on(module)
-    driver.open()
-    driver.start()
+    driver = started(module)
     run(driver)
     written = [len(card.written) for card in module.cards]
     module.trouble = Trouble('watchdog_reload', board, times=1, kind='wrong')
@@ -196,20 +174,6 @@ def test_whatever_a_call_does_it_ends_without_current_and_comes_back(call: str, 
             module.check_end()
 
 
-@pytest.mark.parametrize('got', [0, None, 2])
-def test_a_sample_task_that_has_stopped_is_lost_boards(
-    got: int | None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    module = Module()
-    driver = driver_on(module)
-    driver.open()
-    driver.start()
-    run(driver)
-    monkeypatch.setattr(type(module.cards[0]), 'task_read_encoder', lambda *_: got)
-    with pytest.raises(DriverError, match='sample clock has stopped'):
-        driver.read(np.zeros(6, dtype=np.int32))
-
-
 @pytest.mark.parametrize(('slower', 'late'), [(4e-4, False), (8e-4, True)])
 def test_boards_whose_clock_is_a_little_slow_are_not_late(slower: float, late: bool) -> None:
     module = Module()
@@ -271,17 +235,6 @@ def test_with_the_vendors_module_its_driver_is_made(monkeypatch: pytest.MonkeyPa
     driver.open()
     assert [card.open for card in module.cards] == [True, True]
     driver.close()
-
-
-def test_it_gives_up_on_a_call_that_is_interrupted_for_ever() -> None:
-    module = Module()
-    driver = driver_on(module)
-    driver.open()
-    driver.start()
-    module.trouble = Trouble('task_read_encoder', kind='interrupted')
-    with pytest.raises(DriverError, match='interrupted'):
-        driver.read(np.zeros(6, dtype=np.int32))
-    assert module.cards[0].calls.count('task_read_encoder') < 10
 
 
 def test_signals_interrupt_no_read() -> None:

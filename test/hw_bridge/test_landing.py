@@ -13,6 +13,7 @@ from maglev_model.currents import exact_currents
 from maglev_model.inverse import CurrentLimits
 from maglev_model.machine import machine_constants
 from maglev_model.motor import vertical_force
+from maglev_model.parameters import ParameterError, build
 
 SOFT = 0.05  # [m/s]
 HEIGHTS = [0.0185, 0.020, 0.0225, 0.025, 0.0285, 0.030, 0.0308]
@@ -180,3 +181,20 @@ def test_what_no_motors_can_hold_against_an_amplifier(
     share = 2.0 / 3.0 * current  # of a phase alone
     pull = [-vertical_force(machine, gap, share * np.cos(a), share * np.sin(a)) for a in angles]
     assert (2.0 * max(pull) < machine.M_y * machine.G) == can_be_held
+
+
+def test_an_emergency_stop_ends_the_landing_in_time() -> None:
+    times = {'boards.stop_time': 0.5, 'landing.braking_time': 0.1, 'landing.descent_time': 0.3}
+    times |= {'landing.settle_time': 0.05}
+    flight = Flight(hover(0.025), {**times, 'boards.enable_output': 1})
+    flight.run(150)
+    flight.stage.stop()
+    flight.stage.landing.arrays.descent_start = 60.0  # a landing that does not end
+    samples = 0
+    while flight.boards.lines.enabled:
+        flight.step(False)
+        samples += 1
+    assert samples == pytest.approx(500, abs=2)
+    assert flight.stage.mode is Mode.DISABLED
+    with pytest.raises(ParameterError, match=r'boards\.stop_time'):
+        build(BridgeParameters, {'boards.stop_time': 1.0})

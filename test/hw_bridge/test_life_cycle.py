@@ -371,23 +371,6 @@ def test_real_boards_are_not_homed_at_the_start() -> None:
         BridgeStage(real, driver=driver)
 
 
-def test_an_emergency_stop_ends_the_landing_in_time() -> None:
-    times = {'boards.stop_time': 0.5, 'landing.braking_time': 0.1, 'landing.descent_time': 0.3}
-    times |= {'landing.settle_time': 0.05}
-    flight = Flight(hover(0.025), {**times, 'boards.enable_output': 1})
-    flight.run(150)
-    flight.stage.stop()
-    flight.stage.landing.arrays.descent_start = 60.0  # a landing that does not end
-    samples = 0
-    while flight.boards.lines.enabled:
-        flight.step(False)
-        samples += 1
-    assert samples == pytest.approx(500, abs=2)
-    assert flight.stage.mode is Mode.DISABLED
-    with pytest.raises(ParameterError, match=r'boards\.stop_time'):
-        build(BridgeParameters, {'boards.stop_time': 1.0})
-
-
 def test_a_cut_is_put_out_before_it_is_explained(monkeypatch: pytest.MonkeyPatch) -> None:
     flight = Flight(hover(0.025), {'boards.enable_output': 1})
     flight.run(150)

@@ -12,9 +12,21 @@ from maglev_model.parameters import build
 LINES = {'boards__stop_input': 3, 'boards__enable_output': 5}
 
 
-def driver_on(module: Module, **overrides: object) -> QuanserDriver:
+def bridge_parameters(**overrides: object) -> BridgeParameters:
+    """``__`` in a parameter's name stands for a dot."""
     names = {name.replace('__', '.'): value for name, value in overrides.items()}
-    return QuanserDriver(build(BridgeParameters, names), module, lambda: 0.0, module.sleep)
+    return build(BridgeParameters, names)
+
+
+def driver_on(module: Module, **overrides: object) -> QuanserDriver:
+    return QuanserDriver(bridge_parameters(**overrides), module, lambda: 0.0, module.sleep)
+
+
+def started(module: Module, **overrides: object) -> QuanserDriver:
+    driver = driver_on(module, **overrides)
+    driver.open()
+    driver.start()
+    return driver
 
 
 def run(driver: QuanserDriver, samples: int = 5) -> np.ndarray:

@@ -9,12 +9,11 @@ explain what was seen instead is found in :mod:`maglev_hw_bridge.diagnosis`.
 from __future__ import annotations
 
 import dataclasses
-from typing import Protocol
 
 import numpy as np
 
 from maglev_hw_bridge.amplifiers import Amplifiers
-from maglev_hw_bridge.drivers import CountArray, VoltArray
+from maglev_hw_bridge.drivers import CountArray, SampledDriver, VoltArray
 from maglev_hw_bridge.encoders import Encoders
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.rig import Rig
@@ -29,27 +28,11 @@ _LONGEST_WAIT = 3.0  # for that [s]
 _FRICTIONS = ((1.0, 1.0), (0.6, 0.6), (0.6, 1.5), (1.5, 0.6), (1.5, 1.5))  # x and z, tilts
 
 
-class Bench(Protocol):
-    """What pulses are given to: of a driver, what goes on sample by sample."""
-
-    def start(self) -> None:
-        """Amplifiers enabled, without current."""
-
-    def write(self, volts: VoltArray) -> None:
-        """Put out the volts (12,)."""
-
-    def read(self, counts: CountArray) -> None:
-        """Wait for the next tick and read counts (6,) into ``counts``."""
-
-    def stop(self) -> None:
-        """No current, amplifiers disabled."""
-
-
 class Pulses:
-    """Pulses on one machine, which is started and stopped here."""
+    """Pulses on one set of boards; the driver must be open, and is started and stopped here."""
 
     def __init__(
-        self, parameters: BridgeParameters, driver: Bench, encoders: Encoders, peak: float
+        self, parameters: BridgeParameters, driver: SampledDriver, encoders: Encoders, peak: float
     ) -> None:
         """``peak``: largest phase current [A]."""
         self._driver, self._encoders = driver, encoders
@@ -148,14 +131,21 @@ class _Twin:
         emulation = dataclasses.replace(parameters.emulation, wiring=wiring, inject=inject)
         twin = dataclasses.replace(parameters, emulation=emulation)
         self._rig = Rig(twin)
-        self._volts = np.zeros(PHASES)
         self._rest = parameters.machine.gap_max
-        self._pulses = Pulses(twin, self, Encoders(twin), peak)
+        self._pulses = Pulses(twin, _RigDriver(self._rig), Encoders(twin), peak)
 
     def phase(self, phase: int, place: FloatArray) -> FloatArray:
         self._rig.place(np.array([self._rest, place[0], place[1], 0.0, 0.0]))
         self._rig.arrays.current[:] = 0.0
         return self._pulses.phase(phase)
+
+
+class _RigDriver:
+    """The rig without boards before it: nothing to arm, enable or disable."""
+
+    def __init__(self, rig: Rig) -> None:
+        self._rig = rig
+        self._volts = np.zeros(PHASES)
 
     def start(self) -> None:
         pass
@@ -165,7 +155,7 @@ class _Twin:
 
     def read(self, counts: CountArray) -> None:
         self._rig.advance(self._volts)
-        counts[:] = self._rig.counts().astype(np.int32)
+        counts[:] = self._rig.counts()
 
     def stop(self) -> None:
         pass

@@ -26,7 +26,27 @@ class WatchdogError(DriverError):
     """The boards' watchdog expired: they went to their expiry states and refuse everything."""
 
 
-class Driver(Protocol):
+class SampledDriver(Protocol):
+    """What goes on sample by sample; every call may raise DriverError."""
+
+    def start(self) -> None:
+        """Arm the watchdog, start the clock that paces :meth:`read`, enable the amplifiers."""
+        ...
+
+    def read(self, counts: CountArray) -> None:
+        """Wait for the next sample and write what the six encoders count into ``counts`` (6,)."""
+        ...
+
+    def write(self, volts: VoltArray) -> None:
+        """Put out the volts of the twelve phases, shape (12,), and reload the watchdog."""
+        ...
+
+    def stop(self) -> None:
+        """No current, amplifiers disabled; then, only where that succeeded, watchdog stopped."""
+        ...
+
+
+class Driver(SampledDriver, Protocol):
     """What the bridge asks of the boards, in this order; every call may raise DriverError.
 
     :meth:`open`, :meth:`counts` any time, :meth:`start`, then :meth:`read` and :meth:`write` once a
@@ -52,28 +72,12 @@ class Driver(Protocol):
         """Write what the six encoders count right now, without waiting, into ``counts`` (6,)."""
         ...
 
-    def start(self) -> None:
-        """Arm the watchdog, start the clock that paces :meth:`read`, enable the amplifiers."""
-        ...
-
-    def read(self, counts: CountArray) -> None:
-        """Wait for the next sample and write what the six encoders count into ``counts`` (6,)."""
-        ...
-
-    def write(self, volts: VoltArray) -> None:
-        """Put out the volts of the twelve phases, shape (12,), and reload the watchdog."""
-        ...
-
     def disable(self) -> None:
         """No current, amplifiers disabled; samples go on."""
         ...
 
     def enable(self) -> None:
         """Amplifiers enabled, without current."""
-        ...
-
-    def stop(self) -> None:
-        """No current, amplifiers disabled; then, only where that succeeded, watchdog stopped."""
         ...
 
     def close(self) -> None:
