@@ -4,7 +4,9 @@
     python benchmarks/soak.py [--minutes M] [--stage hw_bridge|plant] [--idle] [--out DIR]
 
 Beside it, unless ``--idle``: a busy process for each core, one that fills and frees 400 MB over and
-over, two strangers on every topic of the stage, and 20 MB a second of somebody else's messages.
+over, two strangers on every topic of the stage, and 20 MB a second of somebody else's messages. One
+of the strangers is stopped for some seconds once, early: what publishers keep for a reader that
+lags, at most, they have from then on, and what grows afterwards is something else.
 Prints memory of each node at the beginning and the end, how it and the open files grew, late
 samples and errors, and beside them how late the machine itself was: what keeps a bare thread of the
 highest priority waiting, no node can do without. Where the kernel grants real-time threads a part
@@ -19,6 +21,7 @@ import argparse
 import contextlib
 import json
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -56,6 +59,7 @@ SETTLED = 120.0  # after which a node has all it needs [s]
 GROWTH = 5.0  # of a node's memory, from then on [MB an hour]
 SLACK = 2.0  # by which two looks at the same may differ [MB]
 PERIOD = 5.0  # between two looks [s]
+STOPPED = 60.0, 68.0  # when a stranger is, longer than publishers keep samples for a reader [s]
 
 
 class Look(NamedTuple):
@@ -93,17 +97,18 @@ def nodes(scenario: int) -> dict[str, int]:
 
 
 @contextlib.contextmanager
-def load(*, idle: bool) -> Iterator[None]:
-    """Others at work, unless the machine is to be idle."""
+def load(*, idle: bool) -> Iterator[list[subprocess.Popen[bytes]]]:
+    """Others at work, unless the machine is to be idle; those on the stage's topics."""
     if idle:
-        yield
+        yield []
         return
     scripts = [BUSY] * len(os.sched_getaffinity(0)) + [FILLING, TALKING]
     commands = [[sys.executable, '-c', script] for script in scripts]
-    commands += [[sys.executable, str(SUPPORT / 'stranger.py')]] * 2
+    strangers = 2
+    commands += [[sys.executable, str(SUPPORT / 'stranger.py')]] * strangers
     started = [subprocess.Popen(words, stdout=subprocess.DEVNULL) for words in commands]
     try:
-        yield
+        yield started[-strangers:]
     finally:
         for process in started:
             process.kill()
@@ -117,9 +122,13 @@ def fly(asked: argparse.Namespace, out: Path, limits: Path) -> dict[str, list[Lo
     command += ['--stage', asked.stage, '--duration', str(60.0 * asked.minutes)]
     command += ['--params', str(limits), '--quiet', '--out', str(out)]
     held: dict[str, list[Look]] = {}
-    with load(idle=asked.idle):
+    with load(idle=asked.idle) as strangers:
         scenario = subprocess.Popen(command, start_new_session=True)
+        begin = time.monotonic()
         while scenario.poll() is None:
+            stopped = STOPPED[0] <= time.monotonic() - begin < STOPPED[1]
+            for stranger in strangers[:1]:
+                stranger.send_signal(signal.SIGSTOP if stopped else signal.SIGCONT)
             for name, pid in nodes(scenario.pid).items():
                 if seen := look(pid):
                     held.setdefault(name, []).append(seen)
