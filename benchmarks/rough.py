@@ -65,7 +65,7 @@ def line_of_many(law: str, outcomes: Sequence[Outcome]) -> str:
     note = f'{len(outcomes) - len(own)} lost{f", {hunting} hunt" if hunting else ""}'
     found = (
         np.array([getattr(errors, name) for errors in own]).reshape(-1, len(AXES))
-        for name in ('mean', 'peak', 'movement')
+        for name in ('mean', 'peak', 'rms', 'movement')
     )
     shown = [
         figures(middle(rows, axis=0)) if len(rows) else ''
@@ -79,7 +79,8 @@ def fly_many(count: int, hold: float, places: int, chosen: Sequence[str]) -> Non
     """Print the table of many machines."""
     print(
         '| law | flight | mean: median | worst | largest: median | worst '
-        '| rms about the mean: median | worst | note |\n|:--|:--|--:|--:|--:|--:|--:|--:|:--|'
+        '| rms: median | worst | about the mean: median | worst | note |'
+        '\n|:--|:--|--:|--:|--:|--:|--:|--:|--:|--:|:--|'
     )
     plants = list(machines(PARAMS, count))
     workers = Parallel(n_jobs=-1)

@@ -52,6 +52,12 @@ class Errors:
     bias: FloatArray  # mean of e
     movement: FloatArray  # rms of e about its mean
 
+    @property
+    def rms(self) -> FloatArray:
+        """Of e, (5,)."""
+        found: FloatArray = np.hypot(self.bias, self.movement)
+        return found
+
     @classmethod
     def of(cls, error: FloatArray) -> Errors:
         """Of errors (n, 5)."""
