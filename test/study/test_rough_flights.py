@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from rough import PARAMS
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_model.axes import X
-from maglev_model.parameters import from_yaml
+from maglev_model.parameters import from_yaml, replace
 from maglev_monitor.metrics.repeatability import repeatability
 from maglev_study.references import HOVER, ellipse, held, scan
 from maglev_study.rough_flights import (
+    FRICTIONS,
     Experiment,
     experiments,
     fly_rough,
@@ -62,6 +65,23 @@ def test_the_default_law_flies_the_rough_plant() -> None:
     assert not outcome.lost
     assert outcome.own is not None
     assert np.all(outcome.own.mean < [4e-6, 4e-6, 4e-6, 15e-6, 15e-6])
+
+
+def test_holds_are_nearer_where_less_is_learned_within_a_count() -> None:
+    """Near the middle of a count of x, the farthest from its edges, on every friction."""
+    law = laws(PARAMS, 'rough')['default law']
+    whole = replace(law, {'internal_model.within_count': 1.0})
+    *_, last = experiments(1e-3, hold=6.0)
+    assert abs(math.remainder(last.references.position[-1, X], 1e-5)) < 5e-7
+    found = {law: [], whole: []}
+    for plant in machines(PARAMS, len(FRICTIONS)):
+        for flown, errors in found.items():
+            own = fly_rough(plant, flown, last).own
+            assert own is not None
+            errors.append(own.rms)
+    rms = np.array(found[law])
+    assert np.all(rms < [3.5e-6, 3.5e-6, 3.5e-6, 15e-6, 15e-6])
+    assert np.mean(rms[:, X]) < 0.9 * np.mean(np.array(found[whole])[:, X])
 
 
 def test_machines_that_are_drawn_differ_and_are_the_same_again() -> None:

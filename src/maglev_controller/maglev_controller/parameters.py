@@ -92,6 +92,13 @@ class RegulatorModelParameters(FundamentalParameters):
         'and quiet with any friction (modal form); or they hold, as in the paper',
         choices=('fade', 'hold'),
     )
+    within_count: float = parameter(
+        1.0,
+        'share of an error within a count of x or z that it learns from where the reference rests '
+        '(fade); with less than all of it guides that stick hold the platen less at the edges of '
+        'counts, and without friction it drifts between them',
+        within=(0.0, 1.0),
+    )
     largest_error: tuple[float, ...] = parameter(
         (1e-4, 1e-4, 1e-4, 2e-4, 2e-4),
         'an internal model learns from errors up to this, per axis',

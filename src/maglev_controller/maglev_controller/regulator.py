@@ -354,6 +354,7 @@ def _settings(
         'error_gain': gains[:, 0],
         'rate_gain': gains[:, 1],
         'error_limit': np.where(limited, limits.error, math.inf),
+        'within_count': parameters.internal_model.within_count,
         'learned_error': np.where(limited, parameters.internal_model.largest_error, math.inf),
         'filter_gain': filters[:, 0],
         'filter_forget': filters[:, 1],
@@ -372,9 +373,11 @@ def _settings(
 
 
 def _counts(encoder: EncoderParameters) -> dict[str, ArrayLike]:
+    half = 0.5 * encoder.horizontal_resolution
     return {
         'half_gap': 0.5 * encoder.gap_resolution,
-        'half_horizontal': 0.5 * encoder.horizontal_resolution,
+        'half_horizontal': half,
+        'half_alone': (0.0, half, half, 0.0, 0.0),
         'floored': encoder.rounding == 'floor',
     }
 

@@ -3,6 +3,11 @@
 A platen at rest sticks, and steep friction answers an oscillator's frequency with a phase that no
 gain serves in motion and at rest alike: the two would keep each other going. With nothing to follow
 there is nothing for an oscillator to learn either, so it is let go, over a twentieth of a second.
+
+An integrator that learns from readings makes their mean right, which it is where the platen stays
+about the edge between two counts. Where one encoder tells of an axis and guides stick, it may learn
+less from an error within the count, which may be none, than from one beyond it: then the platen is
+read as the farther count for less of the time, and stays farther within the nearer one.
 """
 
 from __future__ import annotations
@@ -43,3 +48,11 @@ def shares(settings: Record, axis: Record) -> tuple[float, float]:
     if not settings.rest_fades:
         return 1.0, 1.0
     return axis.awake, 1.0 - settings.waking * (1.0 - axis.awake)
+
+
+@borrowing
+def lesson(settings: Record, axis: Record, index: int, error: float) -> float:
+    """What the internal model learns from in place of an error [m, rad]."""
+    if not settings.rest_fades or abs(error) > settings.half_alone[index]:
+        return error
+    return float(error * (1.0 - (1.0 - axis.awake) * (1.0 - settings.within_count)))
