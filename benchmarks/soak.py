@@ -7,6 +7,7 @@ Beside it, unless ``--idle``: a busy process for each core, one that fills and f
 over, two strangers on every topic of the stage, and 20 MB a second of somebody else's messages. One
 of the strangers is stopped for some seconds once, early: what publishers keep for a reader that
 lags, at most, they have from then on, and what grows afterwards is something else.
+
 Prints memory of each node at the beginning and the end, how it and the open files grew, late
 samples and errors, and beside them how late the machine itself was: what keeps a bare thread of the
 highest priority waiting, no node can do without. Where the kernel grants real-time threads a part

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import ArrayLike
+from bench import HOVER, ZERO, Bench
 
 from maglev_controller.parameters import ControllerParameters
-from maglev_controller.regulator import MeasurementFault, Regulator
+from maglev_controller.regulator import MeasurementFault
 from maglev_controller.sample_step import answer_sample
 from maglev_model.axes import AXES
 from maglev_model.machine import MachineParameters, machine_constants
@@ -19,37 +19,7 @@ from maglev_model.motor import L_h
 from maglev_model.parameters import build, from_yaml, read_yaml, specs
 
 PARAMS = Path(__file__).resolve().parents[2] / 'params'
-HOVER = np.array([0.025, 0.0, 0.0, 0.0, 0.0])
-ZERO = np.zeros(5)
 UNIT_Y = np.eye(5)[0]
-
-
-class Bench:
-    """A regulator with its outputs, fed by hand."""
-
-    def __init__(self, parameters: ControllerParameters | None = None) -> None:
-        self.regulator = Regulator(parameters or ControllerParameters())
-        self.direct, self.quadrature = np.full(4, 9.0), np.full(4, 9.0)
-
-    def step(
-        self,
-        gap: ArrayLike = 0.025,
-        x: float = 0.0,
-        z: float = 0.0,
-        position: np.ndarray = HOVER,
-        velocity: np.ndarray = ZERO,
-        acceleration: np.ndarray = ZERO,
-    ) -> bool:
-        """One sample; ``gap`` one for all motors or four."""
-        gaps = np.broadcast_to(np.asarray(gap, dtype=float), (4,)).copy()
-        return self.regulator.step(
-            gaps, x, z, position, velocity, acceleration, self.direct, self.quadrature
-        )
-
-    @property
-    def currents(self) -> np.ndarray:
-        """i_d and i_q last commanded, a copy."""
-        return np.concatenate((self.direct, self.quadrature))
 
 
 def paper() -> ControllerParameters:

@@ -71,8 +71,7 @@ SETTINGS: Final = np.dtype(
         ('doubt', 'f8'),  # share of a difference within the count that is not believed at rest
         ('half_gap', 'f8'),  # half a count of the gaps' encoders [m]
         ('half_horizontal', 'f8'),  # of those of x and z
-        ('half_alone', 'f8', 5),  # half a count where one encoder tells of an axis, else 0
-        ('within_count', 'f8'),  # share of an error within it that is learned from at rest
+        ('within_count', 'f8', 5),  # share of an error within that that is learned from at rest
         ('floored', '?'),  # whether counts are rounded down
         ('notches', 'i8', 5),  # how many
         ('notch', 'f8', (5, MOST, 5)),  # their coefficients, as of Notch

@@ -42,7 +42,7 @@ from maglev_controller.foreign_sample import (
     warm_up,
 )
 from maglev_controller.laws import control_law, find_law
-from maglev_controller.parameters import ControllerParameters, EncoderParameters
+from maglev_controller.parameters import ControllerParameters
 from maglev_controller.rest import FADING_TIME as REST_FADING_TIME
 from maglev_controller.sample_step import (
     BAD_REFERENCE,
@@ -51,6 +51,7 @@ from maglev_controller.sample_step import (
     WARPED,
     answer_sample,
 )
+from maglev_controller.stage_parameters import EncoderParameters
 from maglev_controller.voltage import winding_settings
 from maglev_model.axes import AXES, FloatArray
 from maglev_model.machine import machine_constants
@@ -354,7 +355,10 @@ def _settings(
         'error_gain': gains[:, 0],
         'rate_gain': gains[:, 1],
         'error_limit': np.where(limited, limits.error, math.inf),
-        'within_count': parameters.internal_model.within_count,
+        'within_count': [
+            parameters.internal_model.within_count if design.fades and axis in ('x', 'z') else 1.0
+            for axis, design in zip(AXES, designs, strict=True)
+        ],
         'learned_error': np.where(limited, parameters.internal_model.largest_error, math.inf),
         'filter_gain': filters[:, 0],
         'filter_forget': filters[:, 1],
@@ -373,11 +377,9 @@ def _settings(
 
 
 def _counts(encoder: EncoderParameters) -> dict[str, ArrayLike]:
-    half = 0.5 * encoder.horizontal_resolution
     return {
         'half_gap': 0.5 * encoder.gap_resolution,
-        'half_horizontal': half,
-        'half_alone': (0.0, half, half, 0.0, 0.0),
+        'half_horizontal': 0.5 * encoder.horizontal_resolution,
         'floored': encoder.rounding == 'floor',
     }
 

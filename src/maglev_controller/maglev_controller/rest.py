@@ -51,8 +51,8 @@ def shares(settings: Record, axis: Record) -> tuple[float, float]:
 
 
 @borrowing
-def lesson(settings: Record, axis: Record, index: int, error: float) -> float:
+def error_to_learn(settings: Record, axis: Record, index: int, error: float) -> float:
     """What the internal model learns from in place of an error [m, rad]."""
-    if not settings.rest_fades or abs(error) > settings.half_alone[index]:
+    if abs(error) > settings.half_horizontal:
         return error
-    return float(error * (1.0 - (1.0 - axis.awake) * (1.0 - settings.within_count)))
+    return float(error * (1.0 - (1.0 - axis.awake) * (1.0 - settings.within_count[index])))

@@ -23,7 +23,7 @@ from maglev_controller.control_arrays import (
 from maglev_controller.estimation import observe, predict, surprises
 from maglev_controller.friction import friction_ahead, learn_friction
 from maglev_controller.notch_filter import notched
-from maglev_controller.rest import lesson, note_motion, shares
+from maglev_controller.rest import error_to_learn, note_motion, shares
 from maglev_controller.voltage import keep_within_voltage
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import borrowing, compiled
@@ -152,8 +152,8 @@ def _virtual_input(
     axis.smooth_position, axis.smooth_velocity = position + to_position, smooth_velocity
     axis.wanted_acceleration = to_acceleration + acceleration
     error = measured - position - to_position
-    told = lesson(settings, axis, index, error)
-    sample.learned_error[index] = clip(told, settings.learned_error[index])
+    to_learn = error_to_learn(settings, axis, index, error)
+    sample.learned_error[index] = clip(to_learn, settings.learned_error[index])
     if settings.observed[index]:
         seen, seen_velocity = observe(settings, axis, index)
         error, error_rate = seen - position - to_position, seen_velocity - smooth_velocity
