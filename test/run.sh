@@ -13,12 +13,11 @@ MAGLEV_SETUP=test . "$root/setup.sh"
 take_domain() {
   local locks=${XDG_RUNTIME_DIR:-/tmp}/maglev-domains-$UID number
   mkdir -p -- "$locks"
-  for number in $(shuf -i 1-20); do
+  for number in $(shuf -i 1-25); do
     exec 8>"$locks/$number"
     if flock -n 8; then
       export ROS_DOMAIN_ID=$number
-      MAGLEV_TEST_DOMAINS=$(seq -s ' ' "$number" 20 100)
-      export MAGLEV_TEST_DOMAINS
+      export MAGLEV_TEST_DOMAINS="$number $((number + 25)) $((number + 50)) $((number + 75))"
       return
     fi
   done
@@ -118,10 +117,10 @@ code=0
 if (($#)); then
   run_pytest "$@" || code=$?
 else
-  # Five files at a time, for those with real nodes wait often, and a flight in lockstep bears what
+  # Four files at a time, for those with real nodes wait often, and a flight in lockstep bears what
   # the others take; then, with the machine to themselves, those that fly in real time.
   asked=${MAGLEV_LONG:+ or long}
-  run_pytest -p xdist -n 5 --dist loadfile --no-loadscope-reorder \
+  run_pytest -p xdist -n 4 --dist loadfile --no-loadscope-reorder \
     -m "not alone and (not long$asked)" || code=$?
   mapfile -t alone < <(grep -rlF mark.alone --include='test_*.py' test)
   run_pytest -m "alone and (not long$asked)" "${alone[@]}" || code=$?
