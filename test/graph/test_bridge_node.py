@@ -290,7 +290,7 @@ def test_stopped_in_flight_it_lands_first(
 
 BREAKING = """
 from maglev_hw_bridge.node import BridgeNode
-from maglev_node.process import main
+from maglev_node.executable import run_nodes
 
 class Breaking(BridgeNode):
     def __init__(self):
@@ -300,7 +300,7 @@ class Breaking(BridgeNode):
     def _break(self):
         raise RuntimeError('a defect')
 
-main('hw_bridge', Breaking)
+run_nodes('hw_bridge', Breaking)
 """
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 import signal
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -54,6 +56,30 @@ def test_what_never_waits_in_real_time_ends_in_order_and_says_so(nodes: Nodes) -
     stage.signal(signal.SIGXCPU)
     assert stage.wait() == 1
     assert 'too slow or too busy for real time' in stage.output
+
+
+EARLY = """
+import os, signal, sys
+
+class Early:
+    def find_spec(self, name, path=None, target=None):
+        if name == 'rclpy':
+            sys.meta_path.remove(self)
+            os.kill(os.getpid(), signal.SIGINT)
+
+sys.meta_path.insert(0, Early())
+from maglev_monitor.executables import watchers
+watchers()
+"""
+
+
+def test_a_signal_during_its_imports_ends_it_in_order_too(tmp_path: Path) -> None:
+    bag = tmp_path / 'bag'
+    command = [sys.executable, '-c', EARLY, '--ros-args', '-p', f'recorder:output:={bag}']
+    done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+    assert done.returncode == 0, done.stderr
+    assert 'Traceback' not in done.stderr
+    assert (bag / 'metadata.yaml').exists()
 
 
 def test_its_last_words_reach_a_recorder_that_lags(

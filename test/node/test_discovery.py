@@ -43,7 +43,7 @@ class Late(node.MaglevNode):
 
 def test_a_node_named_by_text_finds_the_others_while_it_loads(tmp_path: Path) -> None:
     (tmp_path / 'late.py').write_text(LATE)
-    program = 'from maglev_node.process import main\nmain("late", "late:Late")'
+    program = 'from maglev_node.executable import run_nodes\nrun_nodes("late", "late:Late")'
     with subprocess.Popen(
         [sys.executable, '-c', TALKER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as talker:

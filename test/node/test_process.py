@@ -17,6 +17,7 @@ from rclpy.duration import Duration
 
 from maglev_node import process
 from maglev_node.node import NodeError
+from maglev_node.signals import listen
 from maglev_node.stage_node import StageNode
 
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -76,7 +77,7 @@ def send(*numbers: signal.Signals) -> Callable[[], None]:
 
 
 def run(node: Any) -> int:
-    return process.run('node', lambda: node)
+    return process.run('node', listen(), lambda: node)
 
 
 @pytest.mark.parametrize('number', ENDING)
@@ -120,7 +121,8 @@ def test_a_node_that_waits_is_ended_by_a_second_signal_and_by_no_first() -> None
 
 
 SEVERAL = """
-from maglev_node import node, process
+from maglev_node import node
+from maglev_node.executable import run_nodes
 
 class Made(node.MaglevNode):
     def __init__(self):
@@ -134,7 +136,7 @@ class Made(node.MaglevNode):
 def made(called, after, code=0, fails=False):
     return type(called, (Made,), dict(called=called, after=after, code=code, fails=fails))
 
-process.main('several', {nodes})
+run_nodes('several', {nodes})
 """
 
 
@@ -179,14 +181,14 @@ def test_who_acknowledges_nothing_is_waited_for_once_and_not_by_each_node(
 def test_a_middleware_that_blocks_does_not_keep_the_process() -> None:
     program = (
         'import ctypes\n'
-        'from maglev_node import node, process\n'
+        'from maglev_node import executable, node, process\n'
         'class Stuck(node.MaglevNode):\n'
         '    def __init__(self): super().__init__("stuck", node.NodeParameters)\n'
         '    def spin(self, stop): pass\n'
         '    def close(self): print("closed", flush=True)\n'
         '    def destroy_node(self): ctypes.PyDLL(None).sleep(60)\n'  # and holds the interpreter
         'process._LEAVING_TIME = 0.2\n'
-        'process.main("stuck", Stuck)\n'
+        'executable.run_nodes("stuck", Stuck)\n'
     )
     done = subprocess.run(
         [sys.executable, '-c', program], capture_output=True, text=True, timeout=30, check=False

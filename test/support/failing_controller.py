@@ -9,7 +9,7 @@ from typing import Any
 from maglev_controller import supervision
 from maglev_controller.node import ControllerNode
 from maglev_msgs.msg import Measurement
-from maglev_node.process import main
+from maglev_node.executable import run_nodes
 
 FROM = 1200
 
@@ -54,4 +54,4 @@ def _fail(step: Callable[..., None]) -> Callable[..., None]:
 if __name__ == '__main__':
     how = sys.argv[1]
     supervision.Supervisor.step = _fail(supervision.Supervisor.step)  # type: ignore[method-assign]
-    main('controller', _Failing)
+    run_nodes('controller', _Failing)

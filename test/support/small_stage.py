@@ -11,8 +11,8 @@ from std_srvs.srv import SetBool
 
 from maglev_model.parameters import group, parameter
 from maglev_msgs.msg import Measurement
+from maglev_node.executable import run_nodes
 from maglev_node.managed_node import ManagedNode, ManagedParameters
-from maglev_node.process import main
 from maglev_node.topics import MEASUREMENT, sample_qos
 
 
@@ -66,4 +66,4 @@ class SmallStage(ManagedNode[SmallParameters]):
 
 
 if __name__ == '__main__':
-    main('small_stage', SmallStage)
+    run_nodes('small_stage', SmallStage)

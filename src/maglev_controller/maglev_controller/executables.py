@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from maglev_node.process import main
+from maglev_node.executable import run_nodes
 
 
 def controller() -> None:
     """Entry point of the executable ``controller``."""
-    main('controller', 'maglev_controller.node:ControllerNode')
+    run_nodes('controller', 'maglev_controller.node:ControllerNode')
 
 
 if __name__ == '__main__':

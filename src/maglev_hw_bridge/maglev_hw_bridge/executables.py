@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from maglev_node.process import main
+from maglev_node.executable import run_nodes
 
 
 def hw_bridge() -> None:
     """Entry point of the executable ``hw_bridge``."""
-    main('hw_bridge', 'maglev_hw_bridge.node:BridgeNode')
+    run_nodes('hw_bridge', 'maglev_hw_bridge.node:BridgeNode')
 
 
 if __name__ == '__main__':

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from maglev_node.process import main
+from maglev_node.executable import run_nodes
 
 _MONITOR = 'maglev_monitor.live.node:MonitorNode'
 _RECORDER = 'maglev_monitor.bag.recorder:RecorderNode'
@@ -10,12 +10,12 @@ _RECORDER = 'maglev_monitor.bag.recorder:RecorderNode'
 
 def monitor() -> None:
     """Entry point of the executable ``monitor``."""
-    main('monitor', _MONITOR)
+    run_nodes('monitor', _MONITOR)
 
 
 def recorder() -> None:
     """Entry point of the executable ``recorder``."""
-    main('recorder', _RECORDER)
+    run_nodes('recorder', _RECORDER)
 
 
 def watchers() -> None:
@@ -23,4 +23,4 @@ def watchers() -> None:
 
     To each of which the middleware then brings a message once.
     """
-    main('watchers', _RECORDER, _MONITOR)
+    run_nodes('watchers', _RECORDER, _MONITOR)

@@ -9,9 +9,9 @@ import pkgutil
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterable, Sequence, Sized
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, NoReturn
 
 import rclpy
 from rclpy.duration import Duration
@@ -34,29 +34,17 @@ _LEAVING_TIME = 5.0
 
 _BACKGROUND_NICENESS = 5
 
-_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU)
 
-
-def run(name: str, *make_nodes: Callable[[], MaglevNode[Any]]) -> int:
+def run(name: str, caught: Sequence[int], *make_nodes: Callable[[], MaglevNode[Any]]) -> int:
     """Run the nodes of a process to their end and return its exit code.
 
-    SIGINT, SIGTERM and SIGHUP (unless ignored, as by nohup) end it in order, which is exit code 0
+    SIGINT, SIGTERM and SIGHUP, once they are in ``caught``, end it in order, which is exit code 0
     unless the node says otherwise: :meth:`MaglevNode.close` runs and can still publish. After a
     second signal :meth:`MaglevNode.may_stop` is not asked again until it agrees; what it does
     before it answers, such as a landing, no signal cuts short. SIGXCPU, from the kernel to what
     never waits at real-time priority, ends it so too, with exit code 1.
     What the user did wrong is one line on stderr; a defect shows its traceback.
     """
-    caught: list[int] = []
-
-    def catch(number: int, _frame: object) -> None:
-        if number != signal.SIGXCPU or number not in caught:  # which comes every second
-            caught.append(number)
-
-    for number in _ENDING:
-        if number == signal.SIGHUP and signal.getsignal(number) == signal.SIG_IGN:
-            continue
-        signal.signal(number, catch)
     nodes: list[MaglevNode[Any]] = []
     prepare_middleware()
     try:
@@ -85,7 +73,7 @@ def run(name: str, *make_nodes: Callable[[], MaglevNode[Any]]) -> int:
     return max(node.exit_code or 0 for node in nodes)
 
 
-def _spin(nodes: Sequence[MaglevNode[Any]], caught: Sized) -> None:
+def _spin(nodes: Sequence[MaglevNode[Any]], caught: Sequence[int]) -> None:
     def stop() -> bool:
         return bool(caught) and (all(node.may_stop() for node in nodes) or len(caught) > 1)
 
@@ -95,29 +83,33 @@ def _spin(nodes: Sequence[MaglevNode[Any]], caught: Sized) -> None:
         spin(nodes, stop)
 
 
-def main(name: str, *nodes: str | type[MaglevNode[Any]], background: bool = False) -> None:
-    """Entry point of an executable: run its nodes and leave with their exit code.
+def main(
+    name: str,
+    caught: Sequence[int],
+    *nodes: str | type[MaglevNode[Any]],
+    background: bool = False,
+) -> NoReturn:
+    """Run the nodes of an executable and leave; see :func:`maglev_node.executable.run_nodes`.
 
-    Each is a class, or ``package.module:Class``, which is then imported when the process is on the
-    graph already. With ``--help`` or ``-h`` it only says what they are. Nodes in the background
-    yield to those of the loop when they want the same core. Several are for what only watches:
-    those of the loop take their real-time priority, and land, each in a process of its own.
     What is compiled it has ready, where set-up made it. Leaves without the interpreter's own
     teardown, which may block in the middleware.
     """
-    if {'-h', '--help'} & set(sys.argv[1:]):
-        leave_with(lambda: _help(name, [_load(node) for node in nodes]))
     if background:
         os.nice(_BACKGROUND_NICENESS)
     ahead.use()
     try:
-        code = run(name, *(partial(_make, node) for node in nodes))
+        code = run(name, caught, *(partial(_make, node) for node in nodes))
     except Exception:
         sys.excepthook(*sys.exc_info())
         code = 70
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(code)
+
+
+def say_help(name: str, *nodes: str | type[MaglevNode[Any]]) -> NoReturn:
+    """Say what the nodes of an executable are and leave."""
+    leave_with(lambda: _help(name, [_load(node) for node in nodes]))
 
 
 def _load(node: str | type[MaglevNode[Any]]) -> Any:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from maglev_node.process import main
+from maglev_node.executable import run_nodes
 
 
 def plant() -> None:
     """Entry point of the executable ``plant``."""
-    main('plant', 'maglev_plant.node:PlantNode')
+    run_nodes('plant', 'maglev_plant.node:PlantNode')
 
 
 if __name__ == '__main__':

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from maglev_node.process import main
+from maglev_node.executable import run_nodes
 
 
 def reference() -> None:
     """Entry point of the executable ``reference``."""
-    main('reference', 'maglev_reference.node:ReferenceNode')
+    run_nodes('reference', 'maglev_reference.node:ReferenceNode')
 
 
 if __name__ == '__main__':

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from maglev_node.process import main
+from maglev_node.executable import run_nodes
 
 
 def view() -> None:
     """Entry point of the executable ``view``."""
-    main('view', 'maglev_view.node:ViewNode', background=True)
+    run_nodes('view', 'maglev_view.node:ViewNode', background=True)
 
 
 def web() -> None:
     """Entry point of the executable ``web``."""
-    main('web', 'maglev_view.web.node:WebNode', background=True)
+    run_nodes('web', 'maglev_view.web.node:WebNode', background=True)
