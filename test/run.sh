@@ -117,10 +117,10 @@ code=0
 if (($#)); then
   run_pytest "$@" || code=$?
 else
-  # Four files at a time, for those with real nodes wait often, and a flight in lockstep bears what
+  # Five files at a time, for those with real nodes wait often, and a flight in lockstep bears what
   # the others take; then, with the machine to themselves, those that fly in real time.
   asked=${MAGLEV_LONG:+ or long}
-  run_pytest -p xdist -n 4 --dist loadfile --no-loadscope-reorder \
+  run_pytest -p xdist -n 5 --dist loadfile --no-loadscope-reorder \
     -m "not alone and (not long$asked)" || code=$?
   mapfile -t alone < <(grep -rlF mark.alone --include='test_*.py' test)
   run_pytest -m "alone and (not long$asked)" "${alone[@]}" || code=$?

@@ -60,8 +60,42 @@ def test_two_gaps_are_doubted_where_the_model_agrees_with_the_others(off: float)
 def test_or_where_one_should_have_moved_far_whatever_the_others_read(share: float) -> None:
     watched = hovering()
     watched.length[2:4] += 1.0
-    watched.unseen[[0, 1]] = 3e-5, share * PARAMETERS.fault.stuck_gap
+    others = 1.45 * np.sign(share), share  # times, which tilt nothing that the others could deny
+    watched.unseen[:2] = np.multiply(others, PARAMETERS.fault.stuck_gap)
     assert doubts(watched) == ((UNSEEN, [0, 1]) if abs(share) > 1.5 else (0, []))
+
+
+@pytest.mark.parametrize(
+    ('unseen', 'missing'),
+    [
+        ((9.9e-5, 0.0, 0.0, 0.0), 0.0),
+        ((1.01e-4, 0.0, 0.0, 0.0), 1.01e-4),
+        ((0.0, -2e-4, 0.0, 0.0), 2e-4),
+        ((0.0, 0.0, 3e-4, -2.4e-5), 3e-4),
+        ((1e-4, 1e-4, 0.0, 0.0), 0.0),
+        ((1e-4, 0.0, -1e-4, 0.0), 0.0),
+        ((1e-4, 0.0, 3e-5, 0.0), 1.3e-4),
+        ((0.0, -1e-4, 0.0, -3e-5), 1.3e-4),
+        ((1e-4, -3e-5, 0.0, 0.0), 1.3e-4),
+        ((4e-4, 4e-4, 4e-4, 4e-4), 0.0),
+    ],
+)
+@pytest.mark.parametrize('shown', [0.0, -0.49, 0.49, 0.51, -0.51])
+def test_but_not_where_the_others_deny_that_a_rigid_platen_moved_so(
+    unseen: tuple[float, ...], missing: float, shown: float
+) -> None:
+    """What stuck encoders do not show of it, four gaps would contradict each other by."""
+    watched = hovering()
+    watched.unseen[:4] = unseen
+    watched.residual_then[:] = shown * missing
+    doubted = np.flatnonzero(np.abs(unseen) > 2.5e-5).tolist()
+    if missing and abs(shown) < 0.5:
+        assert doubts(watched)[0] != UNSEEN
+    else:
+        assert doubts(watched) == (UNSEEN, doubted)
+    watched.residual_then[:] = 0.0
+    watched.probation[3] = 1  # no rigid platen any more: nobody can deny
+    assert doubts(watched) == (UNSEEN, [i for i in doubted if i != 3])
 
 
 def test_one_that_is_lost_or_in_probation_is_not_doubted_nor_asked() -> None:

@@ -21,6 +21,7 @@ SETTLING: Final = 100
 _DOUBT = 2.5e-5  # an encoder that should have moved this far is not followed [m]
 _CERTAIN = 1.5  # as many times max_unseen it is stuck whatever the others read
 _DOUBTFUL_RESIDUAL = 6e-5  # [m]
+_DENIED = 1e-4  # of a motion that far the others must show half, where they can [m]
 _GROUND = 1e-3  # this near the lower stop no gap is at stake any more [m]
 _HEARD = 5  # counts one way that no stuck encoder makes
 _FASTEST = 5e-4  # in a sample [m]
@@ -107,12 +108,28 @@ def _residual_since(g: GuardArrays, i: int) -> float:
 
 
 @borrowing
+def _denied(g: GuardArrays, doubted: Flags) -> bool:
+    """Whether four gaps go on being those of a rigid platen that the motion in doubt would tilt.
+
+    Were those that are doubted stuck, they would contradict the others by what they do not show.
+    It is the model that is wrong then, as where a phase is dead.
+    """
+    missing = shown = 0.0
+    for i in range(4):
+        if g.rigid and doubted[i]:
+            missing += g.unseen[i] if i % 2 == 0 else -g.unseen[i]
+            shown = max(shown, _residual_since(g, i))
+    return bool(abs(missing) > _DENIED and shown < 0.5 * abs(missing))
+
+
+@borrowing
 def doubt(g: GuardArrays, flying: bool, doubted: Flags) -> int:
     """Which encoders stand still, ``doubted`` (6,), where others or the model say they should not.
 
-    The model is believed against gap encoders when it agrees with the others, or when three of them
-    tell without it; otherwise a residual says that some of those are wrong that do not count, where
-    it can be one or two. Returns what it was: UNSEEN, CONTRADICTED or 0.
+    The model is believed against gap encoders when it agrees with the others, when three of them
+    tell without it, or when it is certain, unless the others deny the motion; otherwise a residual
+    says that some of those are wrong that do not count, where it can be one or two. Returns what it
+    was: UNSEEN, CONTRADICTED or 0.
     """
     g.rigid = flying
     for i in range(4):
@@ -127,7 +144,8 @@ def doubt(g: GuardArrays, flying: bool, doubted: Flags) -> int:
             certain = certain or abs(g.unseen[i]) > _CERTAIN * g.max_unseen[i]
             agreed = agreed and (doubted[i] or abs(g.believed[i] - g.length[i]) <= _AGREED)
             contradicted += int(_residual_since(g, i) > _DOUBTFUL_RESIDUAL)
-    if unseen > 0 and (agreed or certain or (unseen == 1 and g.rigid)):
+    told = agreed or certain or (unseen == 1 and g.rigid)
+    if unseen > 0 and told and not _denied(g, doubted):
         return UNSEEN
     told = contradicted == 1 or contradicted == 2
     for i in range(4):
