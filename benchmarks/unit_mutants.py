@@ -126,7 +126,10 @@ def _test(module: str, mutant: Mutant | None) -> None:
     code = 1
     try:
         import pytest
+        from hypothesis import Phase, settings
 
+        settings.register_profile('mutants', phases=(Phase.explicit, Phase.generate))
+        settings.load_profile('mutants')  # one example that fails is enough, however large
         if module in TESTS:
             _interpret()
         options = ('-q', '-x', '-W', 'ignore::RuntimeWarning', '-p', 'no:cacheprovider')

@@ -108,6 +108,37 @@ def test_one_that_is_lost_or_in_probation_is_not_doubted_nor_asked() -> None:
             assert doubts(watched) == (UNSEEN, [i for i in range(6) if i != gone])
 
 
+def test_a_bound_that_is_just_reached_is_not_yet_passed() -> None:
+    """To the last bit: in each case one more would say otherwise."""
+    watched = hovering()
+    watched.unseen[:4] = 2.5e-5
+    assert doubts(watched) == (0, [])
+    watched = hovering()
+    watched.unseen[:2], watched.length[2] = 1.5 * PARAMETERS.fault.stuck_gap, 1.0
+    assert doubts(watched) == (0, [])
+    watched.unseen[1] = np.nextafter(watched.unseen[1], 1.0)
+    assert doubts(watched) == (UNSEEN, [0, 1])
+    watched = hovering()
+    watched.unseen[:2], watched.believed[2], watched.length[2] = 3e-5, 2e-5, 0.0
+    assert doubts(watched) == (UNSEEN, [0, 1])
+    watched = hovering()
+    watched.residual_then[0] = 6e-5
+    assert doubts(watched) == (0, [])
+    watched.residual_then[1] = 7e-5
+    assert doubts(watched) == (CONTRADICTED, [1])
+    watched = hovering()
+    watched.unseen[0] = 1e-4
+    assert doubts(watched) == (UNSEEN, [0])
+    watched.unseen[0], watched.residual_then[0] = 2.0**-13, 2.0**-14
+    assert doubts(watched) == (UNSEEN, [0])
+
+
+def test_what_x_and_z_should_have_moved_no_gap_denies() -> None:
+    watched = hovering()
+    watched.unseen[[0, 4]] = 5e-5, 3e-4
+    assert doubts(watched) == (UNSEEN, [0, 4])
+
+
 def test_x_and_z_are_doubted_only_with_gaps_but_keep_their_doubt() -> None:
     watched = hovering()
     watched.unseen[4] = 1e-3

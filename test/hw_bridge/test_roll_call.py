@@ -61,3 +61,16 @@ def test_nobody_is_missed_without_a_reason(why: str) -> None:
     assert not call_the_roll(watched.block[0], True, np.arange(6) == 0)
     assert watched.trust[1] == SOUND
     assert watched.left[0] == pytest.approx(0.0 if why == 'it leapt' else 4.4e-5)
+
+
+def test_a_bound_that_is_just_reached_is_not_yet_passed() -> None:
+    """35 um: of a step that is a leap, and of the way that calls the roll."""
+    watched = hovering()
+    watched.answered[:] = 0
+    watched.past[0, 0], watched.believed[0], watched.left[0] = 0.0, 3.5e-5, 1e-6
+    assert not call_the_roll(watched.block[0], True, np.arange(6) == 0)
+    assert watched.left[0] == 0.0
+    watched.past[0, 0], watched.left[0] = watched.believed[0], PARAMETERS.fault.roll_call
+    assert not call_the_roll(watched.block[0], True, np.arange(6) == 0)
+    watched.left[0] = np.nextafter(watched.left[0], 1.0)
+    assert call_the_roll(watched.block[0], True, np.arange(6) == 0)

@@ -88,6 +88,48 @@ def test_higher_up_or_with_four_gaps_near_the_stop_too_a_gap_must_move(
     np.testing.assert_allclose(watched.unseen[:4], 1e-4)
 
 
+@pytest.mark.parametrize('encoder', range(4))
+def test_a_gap_stands_still_where_friction_holds_y_and_its_own_tilt(encoder: int) -> None:
+    for axis in (PHI, THETA):
+        watched = hovering()
+        watched.least_rate[axis], watched.unseen[:] = 0.1, 1e-5
+        looked(watched)
+        own = PHI if encoder % 2 == 0 else THETA
+        assert bool(watched.unseen[encoder] == 0.0) is (axis != own)
+
+
+def test_a_bound_that_is_just_reached_is_not_yet_passed() -> None:
+    """To the last bit: near the stop, missed by x and z, fast, stuck, and contradicted."""
+    watched = hovering()
+    watched.least_rate[Y] = 0.1
+    watched.rigid, watched.position[Y] = False, watched.upper[Y] - 1e-3
+    looked(watched)
+    assert (watched.unseen[:4] > 0.0).all()
+    watched = hovering()
+    watched.unseen[4], watched.position[X], watched.past[0, 4] = 2.5e-5, 3e-3, -1e-5
+    looked(watched)
+    assert watched.position[X] == 3e-3
+    watched = hovering()
+    lose(watched.block[0], 4)
+    watched.heard[0], watched.read[0], watched.believed[4] = 4, 0.0, 5e-4
+    listen(watched.block[0])
+    assert watched.returned
+    for encoder in range(6):
+        watched = hovering()
+        watched.unseen[encoder] = watched_limit(encoder)
+        assert not find_stuck(watched.block[0], np.arange(6) == encoder, UNSEEN)
+    watched = hovering()
+    watched.residual_then[1] = 0.5 * PARAMETERS.fault.stuck_gap
+    assert not find_stuck(watched.block[0], np.arange(6) == 1, CONTRADICTED)
+
+
+def test_a_contradiction_that_is_older_than_its_last_count_says_nothing() -> None:
+    watched = hovering()
+    watched.believed[0] += 1e-4
+    watched.residual_then[:] = 1e-4
+    assert not find_stuck(watched.block[0], np.arange(6) == 1, CONTRADICTED)
+
+
 def test_one_that_is_lost_counts_no_more() -> None:
     watched = hovering()
     watched.past[0] -= 1e-5

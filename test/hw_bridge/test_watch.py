@@ -9,6 +9,7 @@ from hovering import PARAMETERS, Hover
 from maglev_hw_bridge import guard
 from maglev_hw_bridge.guard_arrays import LOST, PUT_RIGHT, SOUND
 from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.standing_still import SETTLING
 from maglev_model.axes import AXES, X, Y
 from maglev_model.parameters import build
 
@@ -77,6 +78,14 @@ def test_unless_something_else_may_explain_it(why: str) -> None:
         hover.watched.upper[Y] = 0.02505
     for _ in range(31):
         assert hover.sample(flying=why != 'on the ground') == (guard.FINE, 0)
+
+
+def test_nor_before_the_disturbance_is_found() -> None:
+    hover = Hover()
+    hover.watched.samples = SETTLING - 1
+    hover.watched.max_unexplained[:] = -1.0
+    codes = [hover.sample()[0] for _ in range(11)]
+    assert codes == [guard.FINE] * 10 + [guard.MOTORS]
 
 
 @pytest.mark.parametrize('encoder', range(4))
@@ -192,7 +201,8 @@ def test_on_the_stop_the_second_sample_says_where_it_is() -> None:
 
 
 @pytest.mark.parametrize('behind', [0, 1, 3])
-def test_read_at_once_but_late_an_encoder_has_moved_on(behind: int) -> None:
+@pytest.mark.parametrize('settles', [False, True])
+def test_read_at_once_but_late_an_encoder_has_moved_on(behind: int, settles: bool) -> None:
     """x is read at once, z at the tick; both move at 20 mm/s."""
     hover = Hover()
     hover.watched.at_once[:] = [0, 0, 0, 0, 1, 0]
@@ -202,6 +212,8 @@ def test_read_at_once_but_late_an_encoder_has_moved_on(behind: int) -> None:
         late = behind if number > 3 else 0
         hover.length[4] = step * (number + late)
         hover.length[5] = step * number
+        if settles:
+            hover.judge.settle()
         assert hover.sample(behind=late) == (guard.FINE, 0), number
         np.testing.assert_allclose(hover.watched.believed[4:], step * number, atol=1e-6)
 
@@ -217,6 +229,8 @@ def test_before_it_knows_how_fast_they_move_what_is_late_is_taken_as_read() -> N
     for _ in range(2):
         judge.watch(length, np.zeros(12), False, 2)
         np.testing.assert_array_equal(judge.arrays.believed, length)
+    judge.forget()
+    assert not judge.arrays.step.any()
 
 
 def test_homed_anew_every_encoder_is_believed_and_its_past_forgotten() -> None:

@@ -212,7 +212,7 @@ class Guard:
         """Begin anew with the next sample; what an encoder lost it has lost until :meth:`trust`."""
         g = self.arrays
         g.samples = g.contradictions = 0
-        g.unseen[:] = g.rate[:] = 0.0
+        g.unseen[:] = g.step[:] = g.rate[:] = 0.0
         g.silent[:] = 0
 
     def settle(self) -> None:
