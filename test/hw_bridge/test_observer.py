@@ -283,3 +283,33 @@ def test_taken_alone_an_axis_moves_as_the_model_says(axis: int) -> None:
     observer.alone(watched.block[0], axis)
     assert watched.rate.tolist() == np.where(np.arange(5) == axis, 3.0, 1.0).tolist()
     assert watched.disturbance.tolist() == np.where(np.arange(5) == axis, 4.0, 1.0).tolist()
+
+
+@pytest.mark.parametrize('axis', [X, Z])
+def test_taken_at_its_word_it_rests_where_it_reads_and_pushed_as_it_was(axis: int) -> None:
+    """What held it meanwhile was friction: of what pushed before no more is believed."""
+    for pushed in (-9.0, -0.1, 0.1, 9.0):
+        watched = watched_at(np.zeros(5), np.ones(5), np.full(5, 5.0))
+        watched.disturbance_then[axis] = pushed
+        observer.take_at_its_word(watched.block[0], axis, 1e-3)
+        expected = np.full(5, 5.0)
+        expected[axis] = np.clip(pushed, -FRICTION[axis], FRICTION[axis])
+        np.testing.assert_array_equal(watched.disturbance, expected)
+        assert watched.rate.tolist() == [float(other != axis) for other in range(5)]
+        assert watched.position[axis] == watched.length[3 + axis] == 1e-3
+
+
+@pytest.mark.parametrize('axis', [X, Z])
+def test_a_bound_that_is_just_reached_is_not_yet_passed(axis: int) -> None:
+    """To the last bit: near a stop, and what friction just does not hold."""
+    watched = watched_at(np.zeros(5), np.zeros(5), np.zeros(5))
+    watched.lower[axis], watched.upper[axis], watched.position[axis] = -2e-4, 1.0, 0.0
+    assert not observer.supported(watched.block[0], axis)
+    watched.model_rate[axis], watched.friction[axis] = -1.0, 0.0
+    observer.predict(watched.block[0], np.zeros(12))
+    assert watched.least_rate[axis] < 0.0
+    watched.length[:] = lengths(watched.position)
+    watched.rate[axis], watched.acceleration[axis], watched.friction[axis] = -1e-4, -0.25, 0.25
+    used = np.arange(6) != 3 + axis
+    observer.correct(watched.block[0], watched.length.copy(), used, np.zeros(6, bool))
+    assert watched.rate[axis] != 0.0
