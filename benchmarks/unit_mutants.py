@@ -58,7 +58,7 @@ TESTS: dict[str, tuple[str, ...]] = {
     'maglev_hw_bridge.leaps': bridge_tests('leaps'),
     'maglev_hw_bridge.standing_still': bridge_tests('doubts', 'roll_call', 'standing_still'),
     'maglev_hw_bridge.guard': bridge_tests('watch', 'guard'),
-    'maglev_hw_bridge.landing': bridge_tests('way_down'),
+    'maglev_hw_bridge.landing': bridge_tests('way_down', 'way_down_bounds'),
 }
 """Modules that are compiled, and their own tests, which do not fly."""
 

@@ -136,6 +136,21 @@ def test_it_takes_the_most_i_q_that_there_is_room_for(
     assert not realised[2:].any()
 
 
+@pytest.mark.parametrize('gap', [0.02, 0.025, 0.03])
+@pytest.mark.parametrize('w_x', [-500.0, 500.0])
+def test_lifted_hard_the_whole_amplitude_serves_both(gap: float, w_x: float) -> None:
+    """i_q gets what i_d leaves of 7 A; what no current lifts any more leaves it nothing."""
+    direct, quadrature, realised, told = inverse(gap, -245.0, w_x, PRIORITY)
+    assert math.hypot(direct[1], quadrature[1]) == pytest.approx(7.0, rel=1e-9)
+    assert 5.0 < abs(quadrature[1]) < 6.99
+    assert direct[1] < -0.5
+    assert realised[0] == pytest.approx(-245.0, rel=1e-9)
+    assert told == CURRENT | LEVITATION
+    direct, quadrature, _, told = inverse(gap, -500.0, w_x, PRIORITY)
+    assert (direct[1], quadrature[1]) == (-7.0, 0.0)
+    assert told == CURRENT | LEVITATION
+
+
 @pytest.mark.parametrize('w_x', [-500.0, -2.0, 2.0, 500.0])
 def test_it_tells_by_how_much_i_q_was_cut(w_x: float) -> None:
     room = [np.full(n, 9.0) for n in (4, 4, 5, 2)]

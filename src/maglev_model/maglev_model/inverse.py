@@ -155,13 +155,10 @@ def _single_motor_inverse(
     if limits.levitation_first != 0.0:
         root = max((a * a + attraction - (limit * b) ** 2) / (2.0 * a), 0.0)
         limit = min(limit, math.sqrt(max(attraction - root * root, 0.0)) / b)
-    i_q = min(max(u_x, -limit), limit)
+    i_q = clip(u_x, limit)
     square = attraction - (b * i_q) ** 2
     i_d = (a - math.sqrt(max(square, 0.0))) / b
-    bound = limits.current
-    if limits.levitation_first != 0.0:
-        bound = math.sqrt(max(bound * bound - i_q * i_q, 0.0)) * (1.0 + 1e-12)
-    limited = min(max(i_d, -bound), bound)
+    limited = clip(i_d, limits.current)
     for motor in range(4):
         direct[motor] = limited if motor == 1 else 0.0
         quadrature[motor] = i_q if motor == 1 else 0.0
@@ -372,10 +369,7 @@ def _direct_currents(
         direct[two] = (a[two] - math.sqrt(max(square_two, 0.0))) / b[two]
     limited_by = LEVITATION if impossible else 0
     for motor in (one, two):
-        limit = limits.current
-        if limits.levitation_first != 0.0:
-            limit = math.sqrt(max(limit * limit - quadrature[motor] ** 2, 0.0))
-        limited = clip(direct[motor], limit * (1.0 + 1e-12))
+        limited = clip(direct[motor], limits.current)
         if abs(limited - direct[motor]) > 1e-9:
             limited_by |= CURRENT
         direct[motor] = limited

@@ -1,0 +1,76 @@
+"""The bridge's landing where a bound is just reached, and who carries what is not seen."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from maglev_hw_bridge.landing import Landing, impacts_of_cut
+from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_model.axes import PHI, THETA, X, Z
+
+PARAMETERS = BridgeParameters()
+HOVER = np.array([0.025, 0.0, 0.0, 0.0, 0.0])
+LOW = np.array([0.030, 0.0, 0.0, 0.0, 0.0])
+REST = np.zeros(5)
+
+
+def begun(place: np.ndarray, blind: np.ndarray | None = None) -> Landing:
+    landing = Landing(PARAMETERS)
+    landing.begin(place, REST, np.zeros(5, bool) if blind is None else blind)
+    return landing
+
+
+def test_of_what_is_not_seen_x_and_z_decide_before_the_tilts_who_carries() -> None:
+    for unseen in itertools.product([False, True], repeat=4):
+        blind = np.array([False, *unseen])
+        along = int(blind[Z]) - int(blind[X])
+        side = along or int(blind[THETA]) - int(blind[PHI])
+        assert begun(HOVER, blind).arrays.along_z == 0.5 + 0.5 * side
+
+
+@pytest.mark.parametrize('axis', [X, Z])
+def test_what_moves_as_fast_as_it_may_hardly_move_is_braked(axis: int) -> None:
+    rate = REST.copy()
+    rate[axis] = 2e-3
+    landing = Landing(PARAMETERS)
+    landing.begin(HOVER, rate)
+    assert landing.arrays.speed[axis] == 2e-3
+
+
+@pytest.mark.parametrize('axis', [X, Z])
+def test_what_is_off_as_far_as_it_may_be_is_held_and_pushed(axis: int) -> None:
+    landing = begun(HOVER)
+    landing.arrays.stray[axis] = 5e-4  # and twice that where a cut throws it up
+    away = HOVER.copy()
+    away[axis] = 1e-3
+    landing.step(away, REST, REST)
+    assert not landing.astray
+    landing = begun(HOVER)
+    away[axis] = 2e-5
+    landing.step(away, REST, REST)
+    assert np.all(landing.quadrature_current[[1, 3] if axis == X else [0, 2]] != 0.0)
+
+
+def test_at_the_balance_a_cut_does_not_throw_it_up() -> None:
+    landing = begun(LOW)
+    landing.arrays.balance = LOW[0]
+    landing.arrays.stray[X] = 5e-4
+    away = LOW.copy()
+    away[X] = 6e-4
+    landing.step(away, REST, REST)
+    assert landing.astray
+
+
+def test_unseen_it_is_over_below_the_place_from_which_a_cut_is_soft() -> None:
+    landing = begun(LOW, np.arange(5) == X)
+    assert landing.arrays.end == PARAMETERS.machine.gap_max - 5e-5
+    landing.arrays.end = LOW[0]
+    assert not landing.step(LOW, REST, REST)
+
+
+def test_a_free_fall_from_anywhere_is_slower_than_a_speed_that_is_believed() -> None:
+    assert impacts_of_cut(PARAMETERS, 0.025, 0.7) == impacts_of_cut(PARAMETERS, 0.025, np.nan)
+    assert impacts_of_cut(PARAMETERS, 0.025, 0.699) != impacts_of_cut(PARAMETERS, 0.025, np.nan)
