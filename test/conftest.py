@@ -24,7 +24,9 @@ _late = ''  # that the machine does not keep time, and where that was found out
 _worker = os.environ.get('PYTEST_XDIST_WORKER', 'gw0').removeprefix('gw')
 _domains = os.environ.get('MAGLEV_TEST_DOMAINS', '').split()
 if _domains:
-    os.environ['ROS_DOMAIN_ID'] = _domains[int(_worker) % len(_domains)]
+    if int(_worker) >= len(_domains):
+        raise pytest.UsageError(f'more workers than the {len(_domains)} ROS domains that are ours')
+    os.environ['ROS_DOMAIN_ID'] = _domains[int(_worker)]
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -8,16 +8,19 @@ root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd -P)
 cd "$root"
 MAGLEV_SETUP=test . "$root/setup.sh"
 
+workers=5  # files at a time
+
 # Domains nobody else on this machine tests in, one for each worker: held by a lock on a file as long
 # as this shell lives.
 take_domain() {
   local locks=${XDG_RUNTIME_DIR:-/tmp}/maglev-domains-$UID number
   mkdir -p -- "$locks"
-  for number in $(shuf -i 1-25); do
+  for number in $(shuf -i "1-$((100 / workers))"); do
     exec 8>"$locks/$number"
     if flock -n 8; then
       export ROS_DOMAIN_ID=$number
-      export MAGLEV_TEST_DOMAINS="$number $((number + 25)) $((number + 50)) $((number + 75))"
+      MAGLEV_TEST_DOMAINS=$(seq -s ' ' "$number" $((100 / workers)) 100)
+      export MAGLEV_TEST_DOMAINS
       return
     fi
   done
@@ -117,10 +120,10 @@ code=0
 if (($#)); then
   run_pytest "$@" || code=$?
 else
-  # Five files at a time, for those with real nodes wait often, and a flight in lockstep bears what
-  # the others take; then, with the machine to themselves, those that fly in real time.
+  # Several files at a time, for those with real nodes wait often, and a flight in lockstep bears
+  # what the others take; then, with the machine to themselves, those that fly in real time.
   asked=${MAGLEV_LONG:+ or long}
-  run_pytest -p xdist -n 5 --dist loadfile --no-loadscope-reorder \
+  run_pytest -p xdist -n "$workers" --dist loadfile --no-loadscope-reorder \
     -m "not alone and (not long$asked)" || code=$?
   mapfile -t alone < <(grep -rlF mark.alone --include='test_*.py' test)
   run_pytest -m "alone and (not long$asked)" "${alone[@]}" || code=$?
