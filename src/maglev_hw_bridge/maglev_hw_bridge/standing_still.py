@@ -144,8 +144,8 @@ def doubt(g: GuardArrays, flying: bool, doubted: Flags) -> int:
             certain = certain or abs(g.unseen[i]) > _CERTAIN * g.max_unseen[i]
             agreed = agreed and (doubted[i] or abs(g.believed[i] - g.length[i]) <= _AGREED)
             contradicted += int(_residual_since(g, i) > _DOUBTFUL_RESIDUAL)
-    told = agreed or certain or (unseen == 1 and g.rigid)
-    if unseen > 0 and told and not _denied(g, doubted):
+    credible = agreed or certain or (unseen == 1 and g.rigid)
+    if unseen > 0 and credible and not _denied(g, doubted):
         return UNSEEN
     told = contradicted == 1 or contradicted == 2
     for i in range(4):
