@@ -8,7 +8,7 @@ root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd -P)
 cd "$root"
 MAGLEV_SETUP=test . "$root/setup.sh"
 
-workers=5  # files at a time
+workers=4  # files at a time
 
 # Domains nobody else on this machine tests in, one for each worker: held by a lock on a file as long
 # as this shell lives.
