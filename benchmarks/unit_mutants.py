@@ -47,6 +47,7 @@ _LIBRARIES = (
 TESTS: dict[str, tuple[str, ...]] = {
     'maglev_model.inverse': (
         'test/model/test_inverse.py',
+        'test/model/test_inverse_amplitude.py',
         'test/model/test_attraction_shares.py',
         'test/model/test_single_motor_inverse.py',
     ),
