@@ -71,6 +71,7 @@ FLYING: dict[str, tuple[str, ...]] = {
     ),
     'maglev_hw_bridge.board': bridge_tests('board', 'boards_that_fail', 'driver_calls'),
     'maglev_hw_bridge.drivers.quanser': bridge_tests('driver_calls', 'boards_that_fail', 'board'),
+    'maglev_hw_bridge.knock': bridge_tests('knock'),
     'maglev_hw_bridge.life_cycle': bridge_tests('life_cycle', 'memory'),
     'maglev_hw_bridge.stage': (
         *bridge_tests(

@@ -178,13 +178,17 @@ def test_into_the_flight_of_another_controller_none_speaks(
     assert controller.output.count('silent') == 1
 
 
-def designing(controller: Process) -> list[int]:
-    """Processes in which it designs."""
-    tasks = Path(f'/proc/{controller.pid}/task').glob('*/children')
-    children = [int(child) for task in tasks for child in task.read_text().split()]
-    return [
-        child for child in children if 'design' in Path(f'/proc/{child}/cmdline').read_text('utf-8')
-    ]
+def stop_designing(controller: Process) -> int:
+    """Stop the process in which it designs, however short it lives, as soon as there is one."""
+    deadline = time.monotonic() + 60.0
+    while time.monotonic() < deadline:
+        for children in Path(f'/proc/{controller.pid}/task').glob('*/children'):
+            for child in map(int, children.read_text().split()):
+                if 'design' in Path(f'/proc/{child}/cmdline').read_text('utf-8'):
+                    os.kill(child, signal.SIGSTOP)
+                    return child
+        time.sleep(0.002)
+    raise AssertionError(f'it never designed:\n{controller.output}')
 
 
 def test_during_a_redesign_the_emergency_stop_is_served(nodes: Nodes, watching: Observer) -> None:
@@ -192,9 +196,7 @@ def test_during_a_redesign_the_emergency_stop_is_served(nodes: Nodes, watching: 
     client = watching.node.create_client(Trigger, '/controller/emergency_stop')
     watching.make_heard(client)
     changing = watching.begin_to_set('controller', y__bandwidth=180.0)
-    watching.wait(lambda: bool(designing(controller)))
-    (design,) = designing(controller)
-    os.kill(design, signal.SIGSTOP)
+    design = stop_designing(controller)
     watching.ask(client, Trigger.Request())
     assert not changing.done()
     os.kill(design, signal.SIGCONT)

@@ -10,6 +10,7 @@ import pytest
 
 from maglev_node import dds
 from maglev_node.dds import only_here, prepare_middleware
+from maglev_node.topics import KEPT
 
 PROFILES = 'FASTRTPS_DEFAULT_PROFILES_FILE'
 TRANSPORTS = 'FASTDDS_BUILTIN_TRANSPORTS'
@@ -93,6 +94,11 @@ def test_both_profiles_have_the_same_timing() -> None:
 
     assert len(timing(dds._HERE)) == 2
     assert timing(dds._HERE) == timing(dds._ANYWHERE)
+
+
+def test_a_writer_has_room_at_once_for_all_that_it_keeps_in_real_time() -> None:
+    prepare_middleware()
+    assert text(profiles()['data_writer'], 'allocated_samples') == str(KEPT['realtime'])
 
 
 def test_what_the_user_chose_stays(tmp_path: Path) -> None:

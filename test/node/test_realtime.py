@@ -90,7 +90,8 @@ def test_a_reader_that_is_stopped_costs_no_new_memory_with_every_sample(mode: st
     command = [sys.executable, str(UNHEARD), mode]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
     faults = [float(line) for line in done.stdout.splitlines()]
-    assert max(faults) < 1.0  # in lockstep 50 and more, with the heap as glibc has it
+    # 0.2 in real time where the copies grow, 50 and more in lockstep with the heap as glibc has it
+    assert max(faults) < (0.1 if mode == 'realtime' else 1.0)
 
 
 def test_under_a_limit_memory_is_left_alone() -> None:
