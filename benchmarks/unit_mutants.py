@@ -72,11 +72,10 @@ FLYING: dict[str, tuple[str, ...]] = {
     'maglev_hw_bridge.board': bridge_tests('board', 'boards_that_fail', 'driver_calls'),
     'maglev_hw_bridge.drivers.quanser': bridge_tests('driver_calls', 'boards_that_fail', 'board'),
     'maglev_hw_bridge.knock': bridge_tests('knock'),
-    'maglev_hw_bridge.life_cycle': bridge_tests('life_cycle', 'memory'),
+    'maglev_hw_bridge.life_cycle': bridge_tests('what_a_life_leaves', 'life_cycle', 'memory'),
     'maglev_hw_bridge.stage': (
-        *bridge_tests(
-            'life_cycle', 'memory', 'controllers', 'faults', 'resting', 'sensing', 'landing'
-        ),
+        *bridge_tests('stage_bounds', 'what_a_life_leaves', 'resting', 'landing', 'life_cycle'),
+        *bridge_tests('memory', 'faults', 'sensing', 'controllers'),
         'test/model/test_stage_contract.py',
     ),
 }
@@ -84,7 +83,7 @@ FLYING: dict[str, tuple[str, ...]] = {
 
 EVERY = {**TESTS, **FLYING}
 
-_PATIENCE = 120.0  # with the tests of a mutant [s]
+_PATIENCE = 300.0  # with the tests of a mutant [s]
 
 
 class _Changed(importlib.abc.MetaPathFinder, importlib.abc.Loader):

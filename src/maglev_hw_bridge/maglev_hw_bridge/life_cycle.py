@@ -204,7 +204,7 @@ class StageLife(abc.ABC):
         except DriverError as error:
             raise self._lose_boards(error) from error
         self.guard.forget()
-        self._active, self._age = True, 0
+        self._active = True
         self.mode = Mode.FOLLOWING
 
     def _speaks_against(self) -> str:
@@ -240,7 +240,6 @@ class StageLife(abc.ABC):
         self._active = False
         if self.mode not in (Mode.FOLLOWING, Mode.LANDING, Mode.DISABLED):
             return
-        self.amplifiers.cut()
         try:
             self.driver.stop()
         except DriverError as error:
@@ -281,7 +280,7 @@ class StageLife(abc.ABC):
             except DriverError as error:
                 self._lose_boards(error)
                 return
-            self.mode, self.why, self._age = Mode.FOLLOWING, '', 0
+            self.mode, self.why = Mode.FOLLOWING, ''
 
     def reset(self) -> tuple[bool, str]:
         """Clear the latched fault if its cause is gone; whether it was, and what to know.
@@ -299,7 +298,6 @@ class StageLife(abc.ABC):
         if remaining:
             return False, f'the cause is still there: {remaining}'
         cleared, self.fault = self.fault, None
-        self._direct[:] = self._quadrature[:] = 0.0
         self.guard.forget()
         self.resume()
         if self.mode is Mode.LOST:
@@ -321,22 +319,19 @@ class StageLife(abc.ABC):
         return cause or against
 
     def _restart(self) -> str:
-        """Bring lost boards back: closed, opened, checked and, if active, started; what is wrong.
+        """Bring lost boards back: opened, checked and, if active, started; what is wrong.
 
         They stay lost where something is.
         """
-        self.driver.close()
         total = self.encoders.arrays.total.copy()
         try:
             self.driver.open()
             self.driver.counts(self._counts)
-            self.encoders.decode(self._counts)
             self._forget_home_of_lost_counts(total)
             self.mode = Mode.READY
             wrong = self._speaks_against()
             if self._active and not wrong:
                 fault, self.fault = self.fault, None
-                self.guard.forget()
                 try:
                     self._start()
                 finally:
