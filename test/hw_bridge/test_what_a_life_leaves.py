@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bridge_flight import HOME, Flight, hover
+from made_up import active, volts
 from wired import OFFSET, bridge
 
 from maglev_hw_bridge import life_cycle
@@ -36,19 +37,6 @@ class Clock:
 
     def sleep(self, duration: float) -> None:
         self.slept.append(duration)
-
-
-def volts(boards: EmulatedBoards) -> list[float]:
-    """At the outputs of the twelve phases."""
-    out: list[float] = boards.volts[[0] * 6 + [1] * 6, [*range(6), *range(6)]].tolist()
-    return out
-
-
-def active(**overrides: object) -> tuple[BridgeStage, EmulatedBoards]:
-    stage, boards = bridge(**overrides)
-    stage.configure()
-    stage.activate()
-    return stage, boards
 
 
 def with_current(stage: BridgeStage, boards: EmulatedBoards) -> None:
@@ -307,8 +295,8 @@ def test_boards_that_are_not_enabled_again_are_lost(
     if after == 'landed':
         stage.resume()
     else:
-        refused, why = stage.reset()
-        assert not refused
+        cleared, why = stage.reset()
+        assert not cleared
         assert 'for a test' in why
     assert stage.mode is Mode.LOST
     assert stage.fault == Fault('board', 'for a test', 'see to the boards', True)

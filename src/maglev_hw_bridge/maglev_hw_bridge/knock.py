@@ -10,6 +10,8 @@ friction that there may be, and is doubled, comes last: where nothing is counted
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from maglev_hw_bridge.guard_arrays import GuardArrays
@@ -28,12 +30,11 @@ _LATE = 4  # samples in which a count may still come
 
 @compiled
 def _thrust(machine: Machine, position: FloatArray, i_d: FloatArray, axis: int) -> float:
-    """Acceleration along x or z by 1 A of i_q in both of its motors [m/s²/A]."""
+    """Acceleration along x or z by 1 A of i_q in both its motors, which alone make it [m/s²/A]."""
     i_q = np.zeros(4)
-    rest = output_accelerations(machine, position[0], position[3], position[4], i_d, i_q)[axis]
     i_q[2 - axis :: 2] = 1.0
-    push = output_accelerations(machine, position[0], position[3], position[4], i_d, i_q)[axis]
-    return float(push - rest)
+    y, phi, theta = position[0], position[3], position[4]
+    return float(output_accelerations(machine, y, phi, theta, i_d, i_q)[axis])
 
 
 class _Asked:
@@ -43,24 +44,24 @@ class _Asked:
         """``hardest`` push [m/s²], in samples ``duration``."""
         self.axis = axis
         self._softest, self._duration = hardest / _GROWTH ** (_KNOCKS - 1), duration
-        self.under_way = self._answered = False
-        self._knocks = self._samples = 0  # so far, of this asking and of this knock
-        self._turn = duration  # samples after which it is pushed back, for as long
-        self._push = 0.0  # signed [m/s²]
         self._reading = 0.0  # [m]
         self.passed = 0.0  # which way the last edge was: it is nearest going back
+        self.begin(0.0)
+        self.under_way = False
 
     def follow(self, reading: float) -> None:
         if reading != self._reading:
-            self.passed = 1.0 if reading > self._reading else -1.0
+            self.passed = math.copysign(1.0, reading - self._reading)
             self._reading = reading
 
     def begin(self, sign: float) -> None:
+        """Knock softly that way first, unanswered so far."""
         self.under_way, self._answered = True, False
         self._knocks = 0
         self._knock(sign * self._softest)
 
     def _knock(self, push: float) -> None:
+        """Begin one: ``push`` [m/s²] until the turn, and back for as long."""
         self._samples, self._turn, self._push = 0, self._duration, push
         self._knocks += 1
 

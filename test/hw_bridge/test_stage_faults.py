@@ -1,0 +1,267 @@
+"""Which fault is latched, and how a landing begins and ends; nothing flies."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from made_up import LOWER_STOP, Calls, active, aloft, watched
+
+from maglev_hw_bridge import amplifiers, guard
+from maglev_hw_bridge import stage as module
+from maglev_hw_bridge.guard_arrays import LOST, PUT_RIGHT
+from maglev_hw_bridge.stage import BridgeStage, Mode
+from maglev_model.stage import Fault
+
+
+def test_what_lands_is_not_begun_anew_by_who_asks_for_it() -> None:
+    stage, _ = active()
+    aloft(stage)
+    stage.land('for a test')
+    assert (stage.mode, stage.why, stage.fault) == (Mode.LANDING, 'for a test', None)
+    stage._landing_samples = 17
+    stage.land('for another')
+    assert (stage._landing_samples, stage.why) == (17, 'for a test')
+
+
+def test_a_stop_says_what_it_is() -> None:
+    stage, _ = active()
+    stage.stop()
+    assert stage.fault == Fault('stop', 'emergency stop', 'see to what made it necessary', False)
+    assert stage.why == 'stop'
+    stage, _ = active()
+    stage.stop('why', 'command', 'what to do')
+    assert stage.fault == Fault('command', 'why', 'what to do', False)
+    stage.stop('again', 'command')
+    assert stage.reset()[0], 'only an emergency stop outlasts a reset'
+
+
+def test_the_first_fault_stays_unless_a_landing_is_cut(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module.faults, 'consequence_of_cut', lambda *_: '; it falls')
+    stage, boards = active()
+    aloft(stage)
+    stage._raise_fault('encoder', 'first', 'one')
+    first = stage.fault
+    stage._raise_fault('current', 'second', 'two')
+    assert stage.fault is first
+    assert first is not None
+    assert not first.cut
+    stage._raise_fault('current', 'third', 'three', cut=True)
+    both = Fault('encoder', 'first; then third; it falls', 'one; three', True)
+    assert stage.fault == both
+    assert stage.why == 'encoder'
+    assert stage.mode is Mode.DISABLED
+    assert not boards.lines.enabled
+    stage._raise_fault('current', 'fourth', 'four', cut=True)
+    assert stage.fault == both, 'nothing lands any more'
+
+
+def test_what_is_cut_is_of_the_kind_that_cuts_it_unless_an_encoder_failed_before() -> None:
+    stage, _ = active()
+    aloft(stage)
+    stage._raise_fault('stop', 'first', 'one')
+    stage._raise_fault('current', 'second', 'two', cut=True)
+    assert stage.fault is not None
+    assert stage.fault.kind == stage.why == 'current'
+
+
+def test_a_cut_at_rest_foretells_no_fall() -> None:
+    stage, _ = active()
+    watched(stage, LOWER_STOP)
+    stage._raise_fault('encoder', 'first', 'one', cut=True)
+    assert stage.fault == Fault('encoder', 'first', 'one', True)
+
+
+@pytest.mark.parametrize(
+    ('y', 'rate', 'blind', 'mode'),
+    [
+        (LOWER_STOP, 0.0, False, Mode.DISABLED),
+        (LOWER_STOP - 3e-4, 0.0, True, Mode.DISABLED),
+        (LOWER_STOP - 3e-4, 0.0, False, Mode.LANDING),
+        (LOWER_STOP - 3e-4, -0.06, True, Mode.LANDING),
+        (0.025, 0.0, True, Mode.LANDING),
+        (0.025, 0.0, False, Mode.LANDING),
+    ],
+)
+def test_half_blind_and_near_the_stop_it_is_let_go(
+    y: float, rate: float, mode: Mode, *, blind: bool
+) -> None:
+    stage, _ = active()
+    watched(stage, y, rate)
+    stage.flying = True
+    if blind:
+        stage.guard.arrays.trust[[0, 1]] = LOST  # no tilt is seen
+    stage._begin_landing()
+    assert stage.mode is mode
+
+
+@pytest.mark.parametrize(
+    ('impacts', 'softly'),
+    [
+        ({'lower': 0.0499}, True),
+        ({'lower': 0.0501}, False),
+        ({'upper': 0.01}, False),
+        ({'lower': 0.01, 'upper': 0.01}, False),
+    ],
+)
+def test_it_falls_softly_on_the_lower_stop_alone(
+    monkeypatch: pytest.MonkeyPatch, impacts: dict[str, float], *, softly: bool
+) -> None:
+    stage, _ = active()
+    watched(stage, 0.0305, -0.02)
+    ask = Calls(impacts)
+    monkeypatch.setattr(module, 'impacts_of_cut', ask)
+    assert stage._falls_softly() == softly
+    assert ask.given == [(stage.parameters, 0.0305, -0.02)]
+
+
+def test_what_does_not_fly_is_not_landed() -> None:
+    stage, _ = active()
+    watched(stage, 0.025)
+    stage._begin_landing()
+    assert stage.mode is Mode.DISABLED
+
+
+def test_a_landing_begins_where_the_platen_is_when_all_samples_are_caught_up_with() -> None:
+    stage, _ = active()
+    aloft(stage)
+    stage._behind = 2
+    stage.land('for a test')
+    begun: list[float] = []
+    begin = stage.landing.begin
+
+    def look(position: np.ndarray, *rest: np.ndarray) -> None:
+        begun.append(float(position[0]))
+        begin(position, *rest)
+
+    stage.landing.begin = look  # type: ignore[method-assign]
+    for y in (0.0251, 0.0252, 0.0253):
+        watched(stage, y)
+        stage._descend()
+    assert begun == [0.0251, 0.0252]
+
+
+@pytest.mark.parametrize(('kind', 'ends'), [('stop', True), ('encoder', False)])
+def test_only_a_landing_for_a_stop_has_a_longest_time(kind: str, *, ends: bool) -> None:
+    stage, _ = active(boards__stop_time=1.5)
+    aloft(stage)
+    stage.stop('for a test', kind)
+    for _ in range(1500):
+        watched(stage)
+        stage.landing.begin(stage.guard.arrays.position, np.zeros(5))
+        stage._descend()
+    assert stage.mode is Mode.LANDING
+    stage.landing.begin(stage.guard.arrays.position, np.zeros(5))
+    stage._descend()
+    assert stage.mode is (Mode.DISABLED if ends else Mode.LANDING)
+
+
+def test_a_platen_that_leaves_its_way_down_is_cut() -> None:
+    stage, _ = active()
+    aloft(stage)
+    stage.land('for a test')
+    stage._descend()
+    watched(stage, 0.0265)
+    stage._descend()
+    assert stage.mode is Mode.DISABLED
+    assert stage.fault is not None
+    assert (stage.fault.kind, stage.fault.cut) == ('current', True)
+
+
+@pytest.mark.parametrize(
+    ('code', 'goes_on'),
+    [(amplifiers.FINE, True), (amplifiers.SPENT, True), (amplifiers.OVER_CURRENT, False)],
+)
+def test_currents_of_a_landing_that_are_refused_end_it(
+    monkeypatch: pytest.MonkeyPatch, code: int, *, goes_on: bool
+) -> None:
+    stage, _ = active()
+    aloft(stage)
+    stage.land('for a test')
+    monkeypatch.setattr(stage, '_drive', lambda *_: (code, 0))
+    stage._descend()
+    assert stage.mode is (Mode.LANDING if goes_on else Mode.DISABLED)
+
+
+@pytest.mark.parametrize('code', [guard.RANGE, guard.GAP_RANGE])
+def test_out_of_range_is_a_fault_but_for_what_lands(code: int) -> None:
+    stage, _ = active()
+    aloft(stage)
+    stage._sensing_fault(code, 0)
+    assert stage.fault is not None
+    assert stage.fault.kind == 'range'
+    assert stage.mode is Mode.LANDING
+    latched = stage.fault
+    stage._sensing_fault(code, 1)
+    assert stage.fault is latched
+
+
+@pytest.mark.parametrize('lost', [(0,), (0, 1, 2, 3)])
+def test_without_any_gap_there_is_no_landing(lost: tuple[int, ...]) -> None:
+    stage, _ = active()
+    aloft(stage)
+    stage.guard.arrays.trust[list(lost)] = LOST
+    stage.guard.arrays.blamed[list(lost)] = 1
+    stage._sensing_fault(guard.STUCK, 0)
+    assert stage.fault is not None
+    assert stage.fault.cut == (len(lost) == 4)
+    assert stage.mode is (Mode.DISABLED if len(lost) == 4 else Mode.LANDING)
+
+
+def blamed(stage: BridgeStage, *encoders: int, trust: int = LOST) -> None:
+    stage.guard.arrays.blamed[:] = 0
+    stage.guard.arrays.blamed[list(encoders)] = 1
+    stage.guard.arrays.trust[list(encoders)] = trust
+
+
+def test_what_is_found_out_while_it_lands_is_named_once() -> None:
+    stage, _ = active()
+    aloft(stage)
+    stage.stop('for a test')
+    for encoder in (4, 4, 5):
+        blamed(stage, encoder)
+        stage._sensing_fault(guard.STUCK, encoder)
+    assert stage.fault is not None
+    said = stage.fault.reason
+    assert said.startswith('for a test; then encoder x is stuck')
+    assert said.count('encoder x') == said.count('encoder z') == 1
+    assert stage.fault.remedy.count('check its cable') == 2
+    stage._sensing_fault(guard.MOTORS, 2)
+    stage._sensing_fault(guard.MOTORS, 2)
+    assert stage.fault.reason.count('do not explain') == 1
+    assert (stage.fault.kind, stage.fault.cut) == ('stop', False)
+
+
+def test_a_fault_of_its_own_is_not_named_beside_itself() -> None:
+    stage, _ = active()
+    aloft(stage)
+    blamed(stage, 4)
+    stage._sensing_fault(guard.STUCK, 4)
+    stage._sensing_fault(guard.STUCK, 4)
+    assert stage.fault is not None
+    assert stage.fault.reason.count('encoder x') == 1
+    stage, _ = active()
+    aloft(stage)
+    stage._sensing_fault(guard.MOTORS, 3)
+    stage._sensing_fault(guard.MOTORS, 3)
+    assert stage.fault is not None
+    assert stage.fault.kind == 'current'
+    assert stage.fault.reason.count('do not explain') == 1
+
+
+@pytest.mark.parametrize(
+    ('code', 'trust', 'anew'),
+    [(guard.STUCK, LOST, True), (guard.JUMP, PUT_RIGHT, False), (guard.RESIDUAL, LOST, False)],
+)
+def test_a_landing_begins_anew_where_it_sees_less_than_before(
+    code: int, trust: int, *, anew: bool
+) -> None:
+    stage, _ = active()
+    aloft(stage)
+    stage.stop('for a test')
+    stage._landing_samples = 17
+    blamed(stage, 0, trust=trust)
+    if trust == LOST:
+        stage.guard.arrays.trust[1] = LOST
+    stage._sensing_fault(code, 0)
+    assert stage.mode is Mode.LANDING
+    assert stage._landing_samples == (0 if anew else 17)

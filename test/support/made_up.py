@@ -1,0 +1,50 @@
+"""A bridge whose observer says what a test makes up; nothing flies."""
+
+from __future__ import annotations
+
+from wired import bridge
+
+from maglev_hw_bridge.drivers.emulated import EmulatedBoards
+from maglev_hw_bridge.stage import BridgeStage
+
+LOWER_STOP = 0.031
+
+
+def active(**overrides: object) -> tuple[BridgeStage, EmulatedBoards]:
+    stage, boards = bridge(**overrides)
+    stage.configure()
+    stage.activate()
+    return stage, boards
+
+
+def watched(stage: BridgeStage, y: float = 0.025, rate: float = 0.0, **more: object) -> None:
+    """Have the observer say so, with all gaps at ``y`` unless told otherwise."""
+    state = stage.guard.arrays
+    state.samples = 200
+    state.position[:] = state.rate[:] = state.disturbance[:] = 0.0
+    state.position[0], state.rate[0] = y, rate
+    state.believed[:4] = state.length[:4] = y
+    for name, value in more.items():
+        getattr(state, name)[:] = value
+
+
+def aloft(stage: BridgeStage) -> None:
+    """In flight, as far as the bridge knows."""
+    watched(stage)
+    stage.flying = True
+
+
+def volts(boards: EmulatedBoards) -> list[float]:
+    out: list[float] = boards.volts[[0] * 6 + [1] * 6, [*range(6), *range(6)]].tolist()
+    return out
+
+
+class Calls:
+    """What was asked of something that stands in."""
+
+    def __init__(self, answer: object = None) -> None:
+        self.answer, self.given = answer, []  # type: ignore[var-annotated]
+
+    def __call__(self, *given: object) -> object:
+        self.given.append(given)
+        return self.answer
