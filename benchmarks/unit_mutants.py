@@ -72,7 +72,9 @@ FLYING: dict[str, tuple[str, ...]] = {
     ),
     'maglev_hw_bridge.board': bridge_tests('board', 'boards_that_fail', 'driver_calls'),
     'maglev_hw_bridge.drivers.quanser': bridge_tests('driver_calls', 'boards_that_fail', 'board'),
-    'maglev_hw_bridge.life_cycle': bridge_tests('what_a_life_leaves', 'life_cycle', 'memory'),
+    'maglev_hw_bridge.life_cycle': bridge_tests(
+        'what_a_life_leaves', 'homing', 'life_cycle', 'memory'
+    ),
     'maglev_hw_bridge.stage': (
         *bridge_tests('stage_rest', 'stage_samples', 'stage_faults', 'what_a_life_leaves'),
         *bridge_tests('resting', 'landing', 'life_cycle'),

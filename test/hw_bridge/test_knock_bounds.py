@@ -17,6 +17,7 @@ from maglev_model.platen import output_accelerations
 
 HARDEST, LENGTH = 3.7, 4  # [m/s²], [samples]
 SOFTEST = HARDEST / 1.5**6
+COUNT = 1e-5
 
 
 def asked(**silent: int) -> tuple[Knock, GuardArrays]:
@@ -155,6 +156,7 @@ def test_who_does_not_answer_is_told_and_the_other_is_not() -> None:
         watched.silent[:] = [201 + sample, 0 if sample == 10 else 201 + sample]
         found.append(asking.look(watched, True))
     assert found == [None] * 59 + [4]
+    assert asking.look(watched, True) is None
 
 
 @pytest.mark.parametrize('axis', [0, 1])
@@ -185,13 +187,29 @@ def test_where_no_edge_was_seen_it_is_pushed_where_it_leans(
     watched.acceleration[1 + axis] = 0.3 + pushed
     watched.silent[axis] = 200
     asking.look(watched, True)
-    assert np.sign(asking._asked[axis].acceleration) == way
+    assert asking._asked[axis].acceleration == pytest.approx(way * asking._asked[axis]._softest)
 
 
 def along(i_d: np.ndarray, i_q: np.ndarray, watched: GuardArrays) -> np.ndarray:
     machine = machine_constants(BridgeParameters().machine)
     y, phi, theta = watched.position[[0, 3, 4]]
     return np.array(output_accelerations(machine, y, phi, theta, i_d, i_q))
+
+
+@pytest.mark.parametrize(('axis', 'other'), [(0, 1), (1, 0)])
+def test_who_has_answered_is_not_pushed_on(axis: int, other: int) -> None:
+    asking, watched = asked()
+    watched.silent[other] = 200
+    asking.look(watched, True)
+    watched.silent[other] = 0
+    for _ in range(2):
+        asking.look(watched, True)
+    watched.silent[axis] = 200
+    asking.look(watched, True)
+    i_d, i_q = np.full(4, 0.3), np.zeros(4)
+    more = along(i_d, asking.added(watched, i_d, i_q), watched)
+    assert more[X + axis] == pytest.approx(asking._asked[axis].acceleration)
+    assert more[X + other] == 0.0
 
 
 @pytest.mark.parametrize('both', [True, False])
@@ -219,3 +237,90 @@ def test_as_much_as_the_motors_have_is_not_too_much() -> None:
     asking._limit = np.nextafter(most, 0.0)
     assert asking.added(watched, i_d, i_q) is i_q
     assert not asking._asked[0].under_way
+
+
+def knocks(friction: float) -> tuple[list[float], bool, float]:
+    """How hard a platen in the middle of a count is pushed, one after another, whether in vain,
+    and how far it came [m].
+
+    ``friction`` is that of its guide, set-valued [m/s²]; 3.7 m/s² is the hardest that is tried.
+    """
+    asked = knock._Asked(1, 3.7, 4)
+    asked.begin(1.0)
+    place = rate = farthest = 0.0
+    hard, lost = [], False
+    while asked.under_way and not lost:
+        push = asked.acceleration
+        hard.append(push)
+        free = rate + 1e-3 * push
+        after = np.sign(free) * max(abs(free) - 1e-3 * friction, 0.0)
+        before, place = place, place + 0.5e-3 * (rate + after)
+        rate, farthest = float(after), max(farthest, place)
+        lost = asked.go_on(round(place / COUNT) != round(before / COUNT))
+    return sorted({push for push in hard if push > 0.0}), lost, farthest
+
+
+def test_each_knock_is_harder_than_the_one_before_and_ends_with_the_count() -> None:
+    for friction in (0.0, 0.05, 0.15, 0.35, 0.7, 1.3):
+        hard, lost, farthest = knocks(friction)
+        assert not lost
+        assert np.allclose(np.divide(hard[1:], hard[:-1]), 1.5)
+        assert hard[-1] < max(6.0 * friction, 0.6)
+        assert 0.5 * COUNT < farthest < 1.6 * COUNT
+
+
+def test_by_what_should_have_moved_it_two_counts_it_is_lost() -> None:
+    hard, lost, farthest = knocks(4.0)
+    assert lost
+    assert farthest == 0.0
+    assert hard == pytest.approx([3.7 / 1.5**n for n in range(6, -1, -1)])
+
+
+def test_pushed_to_and_fro_it_is_where_it_was_and_stands() -> None:
+    asked = knock._Asked(1, 3.7, 4)
+    asked.begin(-1.0)
+    pushed = []
+    while asked.under_way:
+        pushed.append(asked.acceleration)
+        if asked.go_on(False):
+            break
+    assert sum(pushed) == pytest.approx(0.0)
+    assert 50 < len(pushed) < 65
+
+
+def test_the_push_goes_back_over_the_edge_it_passed_last() -> None:
+    asking = knock.Knock(build(BridgeParameters, {}))
+    watched = Hover().watched
+    for way in (1.0, -1.0):
+        watched.believed[4:] += way * COUNT
+        watched.silent[:] = 0
+        assert asking.look(watched, True) is None
+        watched.silent[:] = 200
+        assert asking.look(watched, True) is None
+        assert [np.sign(asked.acceleration) for asked in asking._asked] == [-way, -way]
+        for asked in asking._asked:
+            asked.under_way = False
+
+
+def test_nothing_is_asked_on_the_ground_or_with_no_current_left() -> None:
+    parameters = build(BridgeParameters, {})
+    asking, watched = knock.Knock(parameters), Hover().watched
+    watched.silent[:] = 200
+    assert asking.look(watched, False) is None
+    i_d, i_q = np.zeros(4), np.zeros(4)
+    watched.silent[:] = 0
+    assert asking.look(watched, False) is None
+    assert asking.added(watched, i_d, i_q) is i_q
+
+    watched.silent[:] = 200
+    asking.look(watched, True)
+    pushed = asking.added(watched, i_d, i_q).copy()
+    assert np.all(np.abs(pushed) > 0.01)
+    full = np.full(4, parameters.fault.command_limit)
+    assert asking.added(watched, full, i_q) is i_q
+    assert asking.added(watched, i_d, i_q) is i_q, 'it went on after it could not push'
+
+
+def test_a_single_motor_has_nothing_to_ask_z_with() -> None:
+    single = knock.Knock(build(BridgeParameters, {'machine.motors': 1}))
+    assert [asked.axis for asked in single._asked] == [1]

@@ -8,13 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bridge_flight import HOME, Flight, hover
-from made_up import active, volts
+from made_up import Clock, active, volts
 from wired import OFFSET, bridge
 
-from maglev_hw_bridge import life_cycle
 from maglev_hw_bridge.drivers import DriverError
 from maglev_hw_bridge.drivers.emulated import EmulatedBoards
-from maglev_hw_bridge.encoders import HomingError
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.stage import BridgeStage, Mode
 from maglev_model.parameters import build
@@ -22,21 +20,6 @@ from maglev_model.stage import Fault, StageError
 
 LOWER_STOP = 0.031
 LOAD = 0.4  # I2t that was left of a life
-
-
-class Clock:
-    """A time and sleeps that only a test lets pass."""
-
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.now = 1000.0
-        self.slept: list[float] = []
-        monkeypatch.setattr(life_cycle, 'time', self)
-
-    def monotonic(self) -> float:
-        return self.now
-
-    def sleep(self, duration: float) -> None:
-        self.slept.append(duration)
 
 
 def with_current(stage: BridgeStage, boards: EmulatedBoards) -> None:
@@ -103,19 +86,6 @@ def test_counts_of_before_are_the_start_not_a_leap() -> None:
     assert stage.encoders.arrays.total.tolist() == start['emulation__wiring__encoder_start']
 
 
-def test_no_home_at_the_start_is_no_stage(monkeypatch: pytest.MonkeyPatch) -> None:
-    stage, boards = bridge()
-
-    def refuse(_: object) -> None:
-        raise HomingError('for a test')
-
-    monkeypatch.setattr(stage.encoders, 'home', refuse)
-    with pytest.raises(StageError, match='homing refused: for a test'):
-        stage.configure()
-    assert stage.mode is Mode.CLOSED
-    assert not boards.cards
-
-
 @pytest.mark.parametrize('how', ['deactivate', 'close', 'reset', 'lost', 'landed'])
 def test_currents_of_before_do_not_come_back(how: str) -> None:
     stage, boards = active()
@@ -154,80 +124,6 @@ def test_what_was_active_in_a_life_before_is_not_enabled_in_this() -> None:
     assert stage.reset()[0]
     assert stage.mode is Mode.READY
     assert not boards.lines.enabled
-
-
-@pytest.mark.parametrize(
-    ('kind', 'homes'), [('encoder', True), ('board', False), ('current', False)]
-)
-def test_only_with_a_fault_that_homing_mends_the_platen_is_lifted(kind: str, homes: bool) -> None:
-    stage, _ = bridge(homing__at_start=False)
-    stage.configure()
-    stage.fault = latched = Fault(kind, 'for a test', 'none', False)
-    if homes:
-        stage.home()
-    else:
-        with pytest.raises(HomingError, match='a fault is latched: for a test'):
-            stage.home()
-    assert stage.encoders.homed == homes
-    assert stage.fault is latched  # until it is reset
-    assert stage.mode is Mode.READY
-
-
-def test_with_a_fault_latched_it_is_homed_by_word_all_the_same() -> None:
-    stage, _ = bridge(homing__at_start=False)
-    stage.configure()
-    stage.fault = Fault('board', 'for a test', 'none', False)
-    stage.home(vouched=True)
-    assert stage.encoders.homed
-
-
-def test_once_homed_every_encoder_is_believed() -> None:
-    stage, _ = bridge(homing__at_start=False)
-    stage.configure()
-    stage.guard.lose(4)
-    stage.home(vouched=True)
-    assert stage.guard.failed == []
-
-
-@pytest.mark.parametrize('realtime', [True, False])
-def test_between_readings_of_home_real_boards_are_given_time(
-    monkeypatch: pytest.MonkeyPatch, realtime: bool
-) -> None:
-    stage, _ = bridge(homing__at_start=False)
-    clock = Clock(monkeypatch)
-    stage.realtime = realtime
-    stage.configure()
-    stage.home(vouched=True)
-    samples = stage.parameters.homing.samples if realtime else 0
-    assert clock.slept == [stage.sample_time] * samples
-
-
-def test_encoders_that_did_not_count_in_the_lift_are_named() -> None:
-    stage, boards = bridge(homing__at_start=False)
-    for phase in range(12):
-        boards.dead(phase)
-    stage.configure()
-    names = 'gap 1, gap 2, gap 3, gap 4'
-    with pytest.raises(HomingError, match=rf'mrad; encoder {names} did not count\. It hangs'):
-        stage.home()
-    assert stage.fault is None
-
-
-def test_a_fault_of_the_lift_is_told_and_stays() -> None:
-    stage, boards = bridge(homing__at_start=False)
-    stage.configure()
-    tick = boards.tick
-
-    def press() -> None:
-        tick()
-        boards.stop_pressed = boards.ticks > 60
-
-    boards.tick = press
-    with pytest.raises(HomingError, match=r'mrad: the emergency stop is pressed\. It hangs'):
-        stage.home()
-    assert stage.fault is not None
-    assert stage.fault.kind == 'stop'
-    assert not stage.encoders.homed
 
 
 def test_what_cooled_once_has_not_cooled_twice(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -271,6 +167,28 @@ def test_boards_that_do_not_start_are_lost(monkeypatch: pytest.MonkeyPatch) -> N
     assert stage.fault == Fault('board', 'for a test', 'see to the boards', True)
     assert stage.why == 'board'
     assert not boards.cards
+
+
+@pytest.mark.parametrize('asks', ['home', 'activate'])
+def test_boards_that_do_not_tell_their_counts_are_lost(
+    monkeypatch: pytest.MonkeyPatch, asks: str
+) -> None:
+    stage, _ = bridge()
+    stage.configure()
+    monkeypatch.setattr(stage.driver, 'counts', refuse)
+    with pytest.raises(StageError, match='for a test'):
+        getattr(stage, asks)()
+    assert stage.mode is Mode.LOST
+    assert stage.encoders.homed
+
+
+def test_what_was_watched_in_a_life_before_is_forgotten() -> None:
+    stage, _ = active()
+    stage.read()
+    stage.deactivate()
+    assert stage.guard.arrays.samples == 1
+    stage.activate()
+    assert stage.guard.arrays.samples == 0
 
 
 def test_boards_that_are_not_disabled_are_lost(monkeypatch: pytest.MonkeyPatch) -> None:

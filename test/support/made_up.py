@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import pytest
 from wired import bridge
 
+from maglev_hw_bridge import life_cycle
 from maglev_hw_bridge.drivers.emulated import EmulatedBoards
 from maglev_hw_bridge.stage import BridgeStage
 
@@ -48,3 +50,18 @@ class Calls:
     def __call__(self, *given: object) -> object:
         self.given.append(given)
         return self.answer
+
+
+class Clock:
+    """A time and sleeps that only a test lets pass."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now = 1000.0
+        self.slept: list[float] = []
+        monkeypatch.setattr(life_cycle, 'time', self)
+
+    def monotonic(self) -> float:
+        return self.now
+
+    def sleep(self, duration: float) -> None:
+        self.slept.append(duration)

@@ -1,0 +1,98 @@
+"""Homing: what forbids it, what it does, and what it says where it fails."""
+
+from __future__ import annotations
+
+import pytest
+from made_up import Clock
+from wired import bridge
+
+from maglev_hw_bridge.encoders import HomingError
+from maglev_hw_bridge.stage import Mode
+from maglev_model.stage import Fault, StageError
+
+
+def test_no_home_at_the_start_is_no_stage(monkeypatch: pytest.MonkeyPatch) -> None:
+    stage, boards = bridge()
+
+    def refuse(_: object) -> None:
+        raise HomingError('for a test')
+
+    monkeypatch.setattr(stage.encoders, 'home', refuse)
+    with pytest.raises(StageError, match='homing refused: for a test'):
+        stage.configure()
+    assert stage.mode is Mode.CLOSED
+    assert not boards.cards
+
+
+@pytest.mark.parametrize(
+    ('kind', 'homes'), [('encoder', True), ('board', False), ('current', False)]
+)
+def test_only_with_a_fault_that_homing_mends_the_platen_is_lifted(kind: str, homes: bool) -> None:
+    stage, _ = bridge(homing__at_start=False)
+    stage.configure()
+    stage.fault = latched = Fault(kind, 'for a test', 'none', False)
+    if homes:
+        stage.home()
+    else:
+        with pytest.raises(HomingError, match='a fault is latched: for a test'):
+            stage.home()
+    assert stage.encoders.homed == homes
+    assert stage.fault is latched  # until it is reset
+    assert stage.mode is Mode.READY
+
+
+def test_with_a_fault_latched_it_is_homed_by_word_all_the_same() -> None:
+    stage, _ = bridge(homing__at_start=False)
+    stage.configure()
+    stage.fault = Fault('board', 'for a test', 'none', False)
+    stage.home(vouched=True)
+    assert stage.encoders.homed
+
+
+def test_once_homed_every_encoder_is_believed() -> None:
+    stage, _ = bridge(homing__at_start=False)
+    stage.configure()
+    stage.guard.lose(4)
+    stage.home(vouched=True)
+    assert stage.guard.failed == []
+
+
+@pytest.mark.parametrize('realtime', [True, False])
+def test_between_readings_of_home_real_boards_are_given_time(
+    monkeypatch: pytest.MonkeyPatch, realtime: bool
+) -> None:
+    stage, _ = bridge(homing__at_start=False)
+    clock = Clock(monkeypatch)
+    stage.realtime = realtime
+    stage.configure()
+    stage.home(vouched=True)
+    samples = stage.parameters.homing.samples if realtime else 0
+    assert clock.slept == [stage.sample_time] * samples
+
+
+def test_encoders_that_did_not_count_in_the_lift_are_named() -> None:
+    stage, boards = bridge(homing__at_start=False)
+    for phase in range(12):
+        boards.dead(phase)
+    stage.configure()
+    names = 'gap 1, gap 2, gap 3, gap 4'
+    with pytest.raises(HomingError, match=rf'mrad; encoder {names} did not count\. It hangs'):
+        stage.home()
+    assert stage.fault is None
+
+
+def test_a_fault_of_the_lift_is_told_and_stays() -> None:
+    stage, boards = bridge(homing__at_start=False)
+    stage.configure()
+    tick = boards.tick
+
+    def press() -> None:
+        tick()
+        boards.stop_pressed = boards.ticks > 60
+
+    boards.tick = press
+    with pytest.raises(HomingError, match=r'mrad: the emergency stop is pressed\. It hangs'):
+        stage.home()
+    assert stage.fault is not None
+    assert stage.fault.kind == 'stop'
+    assert not stage.encoders.homed
