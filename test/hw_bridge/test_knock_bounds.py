@@ -212,6 +212,27 @@ def test_who_has_answered_is_not_pushed_on(axis: int, other: int) -> None:
     assert more[X + other] == 0.0
 
 
+def test_who_was_asked_when_the_flight_ended_is_not_pushed_in_the_next() -> None:
+    asking, watched = asked(z=200)
+    asking.look(watched, True)
+    watched.silent[:] = 0
+    asking.look(watched, False)
+    watched.silent[0] = 200
+    asking.look(watched, True)
+    i_d, i_q = np.full(4, 0.3), np.zeros(4)
+    more = along(i_d, asking.added(watched, i_d, i_q), watched)
+    assert more[X] == pytest.approx(asking._asked[0].acceleration)
+    assert more[Z] == 0.0
+
+
+def test_it_may_be_asked_in_every_sample_without_a_count() -> None:
+    asking = Knock(build(BridgeParameters, {'fault.silence': 1e-3}))
+    watched = Hover().watched
+    watched.silent[:] = 1
+    asking.look(watched, True)
+    assert [of.under_way for of in asking._asked] == [True, True]
+
+
 @pytest.mark.parametrize('both', [True, False])
 def test_what_is_added_accelerates_it_by_as_much(*, both: bool) -> None:
     asking, watched = asked(x=200, z=200 if both else 0)

@@ -55,6 +55,16 @@ def test_the_first_fault_stays_unless_a_landing_is_cut(monkeypatch: pytest.Monke
     assert stage.fault == both, 'nothing lands any more'
 
 
+def test_a_stop_while_a_fault_is_latched_refuses_one_reset() -> None:
+    stage, _ = active()
+    stage.stop('first')
+    stage.stop('second')
+    cleared, why = stage.reset()
+    assert not cleared
+    assert 'second' in why
+    assert stage.reset() == (True, 'cleared: first')
+
+
 def test_what_is_cut_is_of_the_kind_that_cuts_it_unless_an_encoder_failed_before() -> None:
     stage, _ = active()
     aloft(stage)
@@ -98,7 +108,7 @@ def test_half_blind_and_near_the_stop_it_is_let_go(
     ('impacts', 'softly'),
     [
         ({'lower': 0.0499}, True),
-        ({'lower': 0.0501}, False),
+        ({'lower': 0.05}, False),
         ({'upper': 0.01}, False),
         ({'lower': 0.01, 'upper': 0.01}, False),
     ],
@@ -138,6 +148,24 @@ def test_a_landing_begins_where_the_platen_is_when_all_samples_are_caught_up_wit
         watched(stage, y)
         stage._descend()
     assert begun == [0.0251, 0.0252]
+
+
+def test_a_landing_goes_on_with_every_sample_and_drives_what_it_answers(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    stage, _ = active()
+    aloft(stage)
+    stage.read()
+    watched(stage)
+    stage.stop()
+    drive = Calls((amplifiers.FINE, 0))
+    monkeypatch.setattr(stage, '_drive', drive)
+    stage.hold()
+    assert stage._landing_samples == 1
+    ((i_d, i_q),) = drive.given
+    assert i_d is stage.landing.direct_current
+    assert i_q is stage.landing.quadrature_current
+    assert np.any(i_d)
 
 
 @pytest.mark.parametrize(('kind', 'ends'), [('stop', True), ('encoder', False)])
@@ -190,9 +218,16 @@ def test_out_of_range_is_a_fault_but_for_what_lands(code: int) -> None:
     assert stage.fault is not None
     assert stage.fault.kind == 'range'
     assert stage.mode is Mode.LANDING
+    assert 'outside its soft range' in stage.fault.reason
+    assert ('y is 25.000 mm' if code == guard.RANGE else 'gap 1 is') in stage.fault.reason
     latched = stage.fault
     stage._sensing_fault(code, 1)
     assert stage.fault is latched
+    stage, _ = active()
+    aloft(stage)
+    stage.land('for a test')
+    stage._sensing_fault(code, 0)
+    assert stage.fault is None
 
 
 @pytest.mark.parametrize('lost', [(0,), (0, 1, 2, 3)])
@@ -229,6 +264,21 @@ def test_what_is_found_out_while_it_lands_is_named_once() -> None:
     stage._sensing_fault(guard.MOTORS, 2)
     assert stage.fault.reason.count('do not explain') == 1
     assert (stage.fault.kind, stage.fault.cut) == ('stop', False)
+
+
+def test_what_was_named_for_one_fault_is_named_for_the_next() -> None:
+    stage, _ = active()
+    for _ in range(2):
+        aloft(stage)
+        stage.stop('for a test')
+        blamed(stage, 4)
+        stage._sensing_fault(guard.STUCK, 4)
+        assert stage.fault is not None
+        assert 'encoder x' in stage.fault.reason
+        stage._disable()
+        stage.guard.trust()
+        stage.read()
+        assert stage.reset()[0]
 
 
 def test_a_fault_of_its_own_is_not_named_beside_itself() -> None:

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from made_up import LOWER_STOP, active, watched
 
-from maglev_hw_bridge.stage import Mode
+from maglev_hw_bridge.stage import BridgeStage, Mode
 
 
 @pytest.mark.parametrize(
     ('above', 'rate', 'rests'),
     [
         (0.9e-5, 0.0, True),
+        (1e-5, 0.0, False),
         (1.1e-5, 0.0, False),
         (0.0, 0.99e-2, True),
         (0.0, -0.99e-2, True),
+        (0.0, 1e-2, False),
         (0.0, 1.01e-2, False),
         (0.0, -1.01e-2, False),
     ],
@@ -25,7 +28,8 @@ def test_nearer_than_ten_um_and_slower_than_a_count_in_a_sample_it_rests(
     stage, _ = active()
     watched(stage, LOWER_STOP - above, rate)
     assert stage._touches() == stage._on_the_stop() == rests
-    watched(stage, LOWER_STOP - 1e-3, rate, believed=LOWER_STOP)
+    watched(stage, LOWER_STOP - 1e-3, rate)
+    stage.guard.arrays.believed[:] = [LOWER_STOP] * 4 + [0.0, 0.0]
     stage.guard.arrays.believed[2] = LOWER_STOP - above
     assert not stage._touches()
     assert stage._on_the_stop() == rests, 'all four have to be there'
@@ -207,3 +211,44 @@ def test_what_flies_is_not_parked() -> None:
     stage.flying = True
     assert not stage._slides()
     assert stage._parked_samples == 0
+
+
+def at(stage: BridgeStage, height: float) -> None:
+    """Have a stage whose lower stop is so far from 0 watch a platen at 0, where that is exact."""
+    stage._lower_stop = height
+    watched(stage, 0.0)
+
+
+def test_exactly_at_a_bound_it_neither_rests_nor_has_it_left() -> None:
+    stage, _ = active()
+    at(stage, 2e-4)
+    stage._look_for_rest()
+    assert stage._still_samples == 0
+    at(stage, np.nextafter(2e-4, 0.0))
+    stage._look_for_rest()
+    assert stage._still_samples == 1
+    stage._still_at = 1e-5
+    stage._look_for_rest()
+    assert stage._still_samples == 0
+    at(stage, 3e-4)
+    assert not stage._leaves()
+    at(stage, np.nextafter(3e-4, 1.0))
+    assert stage._leaves()
+
+
+def test_exactly_at_a_bound_it_has_not_slid_nor_leapt_nor_parked() -> None:
+    stage, _ = active()
+    watched(stage, LOWER_STOP)
+    place = stage.guard.arrays.position
+    stage._parked_samples, place[1] = 99, 1e-4
+    stage._was_at[0] = 5e-5
+    assert not stage._slides()
+    assert stage._parked_samples == 0  # it was not parked yet, and is too far for that
+    stage._parked_samples, stage._parked_at[0] = 100, 0.0
+    stage._was_at[0], place[1] = 2.5e-4, 3e-4
+    assert not stage._slides()
+    stage._was_at[0] = place[1] = 0.0
+    stage._parked_samples = 100
+    place[1] = 1e-4
+    assert not stage._slides()
+    assert stage._parked_samples == 101  # so far in a sample is no leap

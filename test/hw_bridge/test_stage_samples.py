@@ -175,6 +175,15 @@ def test_the_stop_is_looked_at_with_every_sample() -> None:
     assert stage.fault == Fault('stop', 'the emergency stop is pressed', 'release it', False)
 
 
+def test_whether_it_rests_is_looked_at_with_every_sample(monkeypatch: pytest.MonkeyPatch) -> None:
+    stage, _ = active()
+    look = Calls()
+    monkeypatch.setattr(stage, '_look_for_rest', look)
+    stage.read()
+    stage.read()
+    assert len(look.given) == 2
+
+
 def test_x_and_z_are_told_apart() -> None:
     stage, boards = active()
     boards.rig.place(np.array([LOWER_STOP, 0.01, -0.02, 0.0, 0.0]))
@@ -192,6 +201,34 @@ def test_boards_that_do_not_read_are_lost(monkeypatch: pytest.MonkeyPatch) -> No
     with pytest.raises(StageError, match='for a test'):
         stage.read()
     assert stage.mode is Mode.LOST
+
+
+def test_boards_that_are_not_written_to_are_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    stage, _ = active()
+
+    def refuse(_: object) -> None:
+        raise DriverError('for a test')
+
+    stage.read()
+    monkeypatch.setattr(stage.driver, 'write', refuse)
+    with pytest.raises(StageError, match='for a test'):
+        stage.hold()
+    assert stage.mode is Mode.LOST
+
+
+def test_what_is_to_knock_goes_with_the_currents(monkeypatch: pytest.MonkeyPatch) -> None:
+    stage, _ = active()
+    watched(stage, LOWER_STOP)
+    added, drive = Calls(3.0 * UP), Calls((amplifiers.FINE, 0))
+    monkeypatch.setattr(stage._knock, 'added', added)
+    monkeypatch.setattr(stage.amplifiers, 'drive', drive)
+    stage._drive(UP, ZERO)
+    ((state, i_d, i_q),) = added.given
+    assert state is stage.guard.arrays
+    assert i_d is UP
+    assert i_q is ZERO
+    ((i_d, i_q, *_),) = drive.given
+    assert (i_d.tolist(), i_q.tolist()) == (UP.tolist(), (3.0 * UP).tolist())
 
 
 def test_a_stage_can_wait_for_its_boards_and_begin_anew() -> None:
