@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -17,6 +18,7 @@ from maglev_hw_bridge.guard import Guard
 from maglev_hw_bridge.landing import Landing
 from maglev_hw_bridge.stage import BridgeStage
 from maglev_study.faults.flight import Flight
+from maglev_study.faults.fly import expected_of
 from maglev_study.faults.judge import Judge, Verdict
 from maglev_study.faults.kinds import Fault
 from maglev_study.faults.machines import machine
@@ -166,3 +168,28 @@ def test_6_a_bridge_that_never_comes_back(flown: Flown, monkeypatch: pytest.Monk
     monkeypatch.setattr(QuanserDriver, 'close', hang)
     verdict = flown(KILLED, 'rest', 0.5)
     assert verdict.violations == ((6, 'the run hangs'),)
+
+
+@pytest.mark.parametrize(
+    ('said', 'right'),
+    [
+        ('encoder gap 2, z jumped', True),
+        ('encoder gap 2 is stuck, or its motors are', True),
+        ('emergency stop; then encoder z jumped', True),
+        ('the gaps contradict each other by 300 um', True),
+        ('encoder gap 1, z jumped', False),
+        ('encoder gap 2, z, x jumped', False),
+        ('the currents commanded do not explain 11 rad/s^2 of phi', False),
+    ],
+)
+def test_of_two_encoders_that_fail_one_sentence_may_name_both(said: str, *, right: bool) -> None:
+    both = expected_of((Fault('noise: x or z', (5,), 80.0), Fault('slip: a gap', (1,), -21.0)))
+    assert bool(re.search(both.blame, said)) == right
+
+
+def test_of_an_encoder_and_another_fault_either_may_be_named() -> None:
+    both = expected_of((Fault('slip: a gap', (1,), -21.0), Fault('stop service')))
+    for said in ('encoder gap 2 jumped', 'emergency stop'):
+        assert re.search(both.blame, said)
+    assert not re.search(both.blame, 'encoder z jumped')
+    assert not expected_of((Fault('slip: a gap', (1,), -21.0), KILLED)).stuck

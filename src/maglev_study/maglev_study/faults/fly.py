@@ -10,6 +10,7 @@ from maglev_model.controller_watch import Status
 from maglev_model.modes import Mode
 from maglev_study.faults.catalogue import KINDS
 from maglev_study.faults.flight import Answer, Bridge, Flight
+from maglev_study.faults.hardware_faults import blame_of
 from maglev_study.faults.judge import Judge, Verdict
 from maglev_study.faults.kinds import CUT, Expected, Fault, Run
 from maglev_study.faults.programme import BEFORE_THE_FIRST_SAMPLE, ON_THE_GROUND
@@ -262,8 +263,12 @@ def expected_of(faults: tuple[Fault, ...]) -> Expected:
     sensing = sum(fault.kind.split(':')[0] in _SENSING for fault in faults)
     impacts = [one.impact for one in each if one.impact is not CUT]
     impact = max(impacts) if len(impacts) == len(each) and sensing < len(each) else CUT
-    blame = '|'.join(one.blame for one in each) if all(one.blame for one in each) else ''
-    return Expected(impact, None, blame, stuck=tuple(i for one in each for i in one.stuck))
+    encoders = tuple(i for one in each for i in one.encoders)
+    words = [one.blame for one in each if not one.encoders]
+    words += [blame_of(encoders)] if encoders else []  # which one sentence may name together
+    blame = '|'.join(words) if all(words) else ''
+    stuck = tuple(i for one in each for i in one.stuck)
+    return Expected(impact, None, blame, stuck=stuck, encoders=encoders)
 
 
 _SENSING = ('stuck', 'slip', 'jump', 'noise', 'reset')

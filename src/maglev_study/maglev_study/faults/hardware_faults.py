@@ -30,6 +30,12 @@ SIZES = {'stuck': (0, 0), 'slip': (1, 50), 'jump': (51, 5000), 'noise': (5, 100)
 WHICH = {'a gap': 'gap', 'x or z': 'across', 'several': 'several'}
 
 
+def blame_of(encoders: Sequence[int]) -> str:
+    """What a fault's words match that blames some of these encoders, and no other."""
+    one = f'(?:{"|".join(ENCODER_NAMES[encoder] for encoder in encoders)})'
+    return f'encoder {one}(?:, {one})* (?:jumped|is stuck|reads|did not count)|contradict'
+
+
 def encoders(name: str, which: str) -> Kind:
     def draw(rng: np.random.Generator) -> Fault:
         if which == 'gap':
@@ -59,10 +65,11 @@ def encoders(name: str, which: str) -> Kind:
         gaps = sum(target < 4 for target in fault.targets)
         lasting = name in ('stuck', 'noise')
         hopeless = lasting and gaps > _DISPENSABLE
-        one = f'(?:{"|".join(ENCODER_NAMES[target] for target in fault.targets)})'
-        blame = f'encoder {one}(?:, {one})* (?:jumped|is stuck|reads|did not count)|contradict'
         stuck = fault.targets if name == 'stuck' else ()
-        return Expected(CUT if hopeless else DEGRADED, 10, blame, stuck=stuck)
+        blame = blame_of(fault.targets)
+        return Expected(
+            CUT if hopeless else DEGRADED, 10, blame, stuck=stuck, encoders=fault.targets
+        )
 
     lost_unseen = name in ('slip', 'jump', 'reset') and which != 'gap'
     phases = tuple(phase for phase in PHASES if not (lost_unseen and phase == 'arming'))

@@ -40,6 +40,7 @@ class Expected(NamedTuple):
     blame: str  # what the reason must match, or ''
     aloft: bool = False  # seen only where the platen flies when it shows
     stuck: tuple[int, ...] = ()  # encoders that stand still from then on
+    encoders: tuple[int, ...] = ()  # those that fail, of which ``blame`` may name any
 
 
 Begin = Callable[['Run', Fault], None]
