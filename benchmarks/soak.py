@@ -174,7 +174,7 @@ def wrong_with(held: dict[str, list[Look]], metrics: dict[str, Any], hours: floa
 
 def lateness(metrics: dict[str, Any], witness: Witness) -> str:
     """Of the samples, and of the machine."""
-    late = metrics['timing']['late_samples'] / metrics['run_samples']
+    late = metrics['timing']['late_samples'] / max(metrics['run_samples'], 1)
     ratio = f'{late / witness.share:.1f} times that' if witness.share else 'none was'
     return (
         f'{late:.4%} of the samples were late; a bare thread of the highest priority was late by'
