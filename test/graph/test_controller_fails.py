@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import sys
@@ -178,15 +179,24 @@ def test_into_the_flight_of_another_controller_none_speaks(
     assert controller.output.count('silent') == 1
 
 
-def stop_designing(controller: Process) -> int:
-    """Stop the process in which it designs, however short it lives, as soon as there is one."""
-    deadline = time.monotonic() + 60.0
-    while time.monotonic() < deadline:
+def designing(controller: Process) -> int | None:
+    """The process in which it designs, if there is one."""
+    with contextlib.suppress(OSError):  # a thread or a process has ended meanwhile
         for children in Path(f'/proc/{controller.pid}/task').glob('*/children'):
             for child in map(int, children.read_text().split()):
                 if 'design' in Path(f'/proc/{child}/cmdline').read_text('utf-8'):
-                    os.kill(child, signal.SIGSTOP)
                     return child
+    return None
+
+
+def stop_designing(controller: Process) -> int:
+    """Stop that process, however short it lives, as soon as there is one."""
+    deadline = time.monotonic() + 60.0
+    while time.monotonic() < deadline:
+        child = designing(controller)
+        if child is not None:
+            os.kill(child, signal.SIGSTOP)
+            return child
         time.sleep(0.002)
     raise AssertionError(f'it never designed:\n{controller.output}')
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from made_up import Clock
+from made_up import Clock, refusing
 from wired import bridge
 
 from maglev_hw_bridge.encoders import HomingError
@@ -13,11 +13,7 @@ from maglev_model.stage import Fault, StageError
 
 def test_no_home_at_the_start_is_no_stage(monkeypatch: pytest.MonkeyPatch) -> None:
     stage, boards = bridge()
-
-    def refuse(_: object) -> None:
-        raise HomingError('for a test')
-
-    monkeypatch.setattr(stage.encoders, 'home', refuse)
+    monkeypatch.setattr(stage.encoders, 'home', refusing(HomingError('for a test')))
     with pytest.raises(StageError, match='homing refused: for a test'):
         stage.configure()
     assert stage.mode is Mode.CLOSED

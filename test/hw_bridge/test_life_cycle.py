@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bridge_flight import Flight, hover
+from made_up import volts
 from wired import OFFSET, bridge
 
 from maglev_hw_bridge.drivers.emulated import EmulatedBoards
@@ -61,9 +62,8 @@ def call(stage: BridgeStage, name: str) -> Any:
 
 
 def no_current(boards: EmulatedBoards) -> bool:
-    volts = boards.volts[[0] * 6 + [1] * 6, [*range(6), *range(6)]]
     expired = not boards.lines.enabled and not np.any(boards.volts)
-    return volts.tolist() == OFFSET or expired
+    return volts(boards) == OFFSET or expired
 
 
 # The mode after a call, or the error it raises, by the mode before it.

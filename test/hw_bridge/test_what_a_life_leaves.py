@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bridge_flight import HOME, Flight, hover
-from made_up import Clock, active, volts
+from made_up import Clock, active, refusing, volts
 from wired import OFFSET, bridge
 
 from maglev_hw_bridge.drivers import DriverError
@@ -18,7 +18,6 @@ from maglev_hw_bridge.stage import BridgeStage, Mode
 from maglev_model.parameters import build
 from maglev_model.stage import Fault, StageError
 
-LOWER_STOP = 0.031
 LOAD = 0.4  # I2t that was left of a life
 
 
@@ -153,8 +152,7 @@ def test_as_hot_as_allowed_is_not_too_hot(monkeypatch: pytest.MonkeyPatch) -> No
     assert stage.mode is Mode.FOLLOWING
 
 
-def refuse(*_: object) -> None:
-    raise DriverError('for a test')
+refuse = refusing(DriverError('for a test'))
 
 
 def test_boards_that_do_not_start_are_lost(monkeypatch: pytest.MonkeyPatch) -> None:

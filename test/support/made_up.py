@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 from wired import bridge
 
@@ -19,15 +21,13 @@ def active(**overrides: object) -> tuple[BridgeStage, EmulatedBoards]:
     return stage, boards
 
 
-def watched(stage: BridgeStage, y: float = 0.025, rate: float = 0.0, **more: object) -> None:
-    """Have the observer say so, with all gaps at ``y`` unless told otherwise."""
+def watched(stage: BridgeStage, y: float = 0.025, rate: float = 0.0) -> None:
+    """Have the observer say so, with all gaps at ``y``."""
     state = stage.guard.arrays
     state.samples = 200
     state.position[:] = state.rate[:] = state.disturbance[:] = 0.0
     state.position[0], state.rate[0] = y, rate
     state.believed[:4] = state.length[:4] = y
-    for name, value in more.items():
-        getattr(state, name)[:] = value
 
 
 def aloft(stage: BridgeStage) -> None:
@@ -37,8 +37,18 @@ def aloft(stage: BridgeStage) -> None:
 
 
 def volts(boards: EmulatedBoards) -> list[float]:
+    """At the outputs of the twelve phases."""
     out: list[float] = boards.volts[[0] * 6 + [1] * 6, [*range(6), *range(6)]].tolist()
     return out
+
+
+def refusing(error: Exception) -> Callable[..., None]:
+    """What raises it, however it is called."""
+
+    def refuse(*_: object) -> None:
+        raise error
+
+    return refuse
 
 
 class Calls:

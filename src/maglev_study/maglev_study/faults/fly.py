@@ -260,18 +260,15 @@ def expected_of(faults: tuple[Fault, ...]) -> Expected:
     each = [KINDS[fault.kind].expected(fault) for fault in faults]
     if len(each) == 1:
         return each[0]
-    sensing = sum(fault.kind.split(':')[0] in _SENSING for fault in faults)
     impacts = [one.impact for one in each if one.impact is not CUT]
-    impact = max(impacts) if len(impacts) == len(each) and sensing < len(each) else CUT
+    sensing = all(one.encoders for one in each)
+    impact = CUT if sensing or len(impacts) < len(each) else max(impacts)
     encoders = tuple(i for one in each for i in one.encoders)
     words = [one.blame for one in each if not one.encoders]
     words += [blame_of(encoders)] if encoders else []  # which one sentence may name together
     blame = '|'.join(words) if all(words) else ''
     stuck = tuple(i for one in each for i in one.stuck)
     return Expected(impact, None, blame, stuck=stuck, encoders=encoders)
-
-
-_SENSING = ('stuck', 'slip', 'jump', 'noise', 'reset')
 
 
 def fly(flight: Flight, scenario: Scenario) -> Verdict:

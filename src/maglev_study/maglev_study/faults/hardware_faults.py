@@ -30,9 +30,9 @@ SIZES = {'stuck': (0, 0), 'slip': (1, 50), 'jump': (51, 5000), 'noise': (5, 100)
 WHICH = {'a gap': 'gap', 'x or z': 'across', 'several': 'several'}
 
 
-def blame_of(encoders: Sequence[int]) -> str:
-    """What a fault's words match that blames some of these encoders, and no other."""
-    one = f'(?:{"|".join(ENCODER_NAMES[encoder] for encoder in encoders)})'
+def blame_of(failed: Sequence[int]) -> str:
+    """What the words of a fault must match that blame some of these encoders, and no other."""
+    one = f'(?:{"|".join(ENCODER_NAMES[encoder] for encoder in failed)})'
     return f'encoder {one}(?:, {one})* (?:jumped|is stuck|reads|did not count)|contradict'
 
 
