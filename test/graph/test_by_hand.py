@@ -14,6 +14,8 @@ from maglev_controller.node import ControllerNode
 from maglev_controller.parameters import ControllerParameters
 from maglev_model.modes import Mode
 from maglev_model.parameters import ParameterError, replace
+from maglev_msgs.msg import Measurement
+from maglev_node.topics import MEASUREMENT, sample_qos
 
 
 @pytest.fixture
@@ -42,13 +44,20 @@ class EndlessDesign:
         raise ParameterError('it ended')
 
 
-def test_an_emergency_stop_does_not_wait_for_a_design(
-    controller: ControllerNode, observer: Observer, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def endless(controller: ControllerNode, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every design of the node lasts until somebody stops it."""
+
     def redesign(_parameters: ControllerParameters) -> EndlessDesign:
         return EndlessDesign(controller)
 
     monkeypatch.setattr(controller.supervisor, 'redesign', redesign)
+
+
+@pytest.mark.usefixtures('endless')
+def test_an_emergency_stop_does_not_wait_for_a_design(
+    controller: ControllerNode, observer: Observer
+) -> None:
     client = observer.node.create_client(Trigger, '/controller/emergency_stop')
     asked = observer.begin_to_ask(client, Trigger.Request())
     with pytest.raises(ParameterError, match='it ended'):
@@ -63,3 +72,26 @@ def test_an_emergency_stop_does_not_wait_for_a_design(
     controller.spin(lambda: controller.supervisor.mode == Mode.DISABLED or time.monotonic() > end)
     observer.wait(lambda: observer.serve(0.01) is None and asked.done())
     assert asked.result().message == 'cleared: emergency stop'
+
+
+@pytest.mark.usefixtures('endless')
+def test_nor_for_a_stage_that_is_never_out_of_measurements(
+    controller: ControllerNode, observer: Observer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    publisher = observer.node.create_publisher(Measurement, MEASUREMENT, sample_qos())
+    end = time.monotonic() + 10.0
+
+    def answer(_message: bytes) -> None:
+        if time.monotonic() < end:
+            publisher.publish(Measurement())
+            time.sleep(0.005)  # in which it arrives
+
+    monkeypatch.setattr(controller._measurements, 'callback', answer)
+    observer.wait(lambda: publisher.get_subscription_count() > 0)
+    client = observer.node.create_client(Trigger, '/controller/emergency_stop')
+    observer.begin_to_ask(client, Trigger.Request())
+    answer(b'')
+    with pytest.raises(ParameterError, match='it ended'):
+        controller.on_parameters(replace(controller.parameters, {'y.bandwidth': 180.0}))
+    assert controller.supervisor.reason == 'emergency stop'
+    assert time.monotonic() < end, 'it was served only when no more measurements came'

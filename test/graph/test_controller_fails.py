@@ -210,6 +210,7 @@ def test_during_a_redesign_the_emergency_stop_is_served(nodes: Nodes, watching: 
     watching.ask(client, Trigger.Request())
     assert not changing.done()
     os.kill(design, signal.SIGCONT)
-    watching.wait(lambda: watching.newest(CONTROLLER_STATE).mode == ControllerState.LANDING)
+    states = watching.messages[CONTROLLER_STATE]
+    watching.wait(lambda: ControllerState.LANDING in states.every('mode'))
     landed_softly(watching)
     assert watching.answer(changing).result is not None

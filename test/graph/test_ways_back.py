@@ -138,6 +138,7 @@ def test_nothing_hurries_after_the_end_and_a_dead_controller_is_noticed(
     watching.wait(lambda: phase(watching) == Reference.END)
     samples(watching, 1100)
     watching.wait(lambda: idles(watching), timeout=10.0)
+    assert watching.set_parameters('reference', duration=200.0).successful  # to be seen in flight
     assert watching.call('/reference/lift_off').success
     watching.wait(lambda: airborne(watching), timeout=10.0)
 

@@ -103,7 +103,7 @@ def test_a_run_that_fails_does_not_stop_the_others(papers: Tree) -> None:
 def test_a_page_that_fails_fails(papers: Tree) -> None:
     papers.behave('paper_tables', '2')
     code, output = tables(papers)
-    assert (code, output.splitlines()[-1]) == (1, 'paper_tables: FAILED')
+    assert (code, output.splitlines()[-1]) == (1, 'paper_tables: FAILED'), output
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])

@@ -15,7 +15,8 @@ NODES = ('watchers', 'plant', 'controller', 'reference', 'view')
 
 # A node that runs until it is told to end and writes down when it does. What it does instead is in
 # a file named after it, or after it and the folder of the run (watchers@steps): `die`, `stubborn`,
-# `warn`, `fail`, or, for the watchers, the verdict `pass` or `miss`, or `wait` for a file `enough`.
+# `warn`, `fail`, or, for the watchers, the verdict `pass` or `miss` once all others are up, or
+# `wait` for a file `enough`.
 STAND_IN = r"""#!/usr/bin/env bash
 name=${0##*/} tree=@TREE@ out='' what=''
 for word; do
@@ -30,6 +31,7 @@ ended() { echo "$name" >>"$tree/ended"; exit "$1"; }
 trap 'ended 0' INT
 trap 'ended 143' TERM
 echo $$ >"$tree/pids/$name" # from now on it can be told to end
+: >"$tree/up/$name${out//\//-}"
 case $what in
   die) sleep 0.3; echo '[INFO] all well' >&2; echo 'error: the belt broke' >&2; exit 3 ;;
   fail) sleep 0.3; echo 'ERROR 1.0 the belt broke' >&2; exit 1 ;;
@@ -44,7 +46,12 @@ case $what in
     echo '{"verdict": "pass"}' >"$out/metrics.json"
     ;;
   pass | miss)
+    while [[ ! -e $out/log/reference.log ]]; do sleep 0.02; done
     sleep 0.3
+    for log in "$out"/log/*.log; do
+      other=${log##*/} other=${other%.log} other=${other/#stage/plant}
+      while [[ ! -e $tree/up/$other${out//\//-} ]]; do sleep 0.02; done
+    done
     echo 'INFO 1790000000.1 recording'
     echo 'y 3.0 um'
     echo "{\"verdict\": \"$what\"}" >"$out/metrics.json"
@@ -75,7 +82,7 @@ class Tree:
         self.out = path / 'run'
         ignored = shutil.ignore_patterns('__pycache__')
         shutil.copytree(ROOT / 'scenarios', path / 'scenarios', ignore=ignored)
-        for name in ('bin', 'pids', 'arguments', 'behaviour', 'params'):
+        for name in ('bin', 'pids', 'up', 'arguments', 'behaviour', 'params'):
             (path / name).mkdir()
         self.script(path / 'bin' / 'python3', f'#!/bin/sh\nexec {sys.executable} "$@"\n')
         (path / 'setup.sh').write_text(

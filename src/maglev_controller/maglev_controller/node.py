@@ -35,6 +35,7 @@ from maglev_node.topics import (
 
 _REFERENCE_PERIOD = 2e-3  # between two looks at what references have arrived [s]
 _HAND_PERIOD = 2e-4  # between two looks at the queues during a redesign [s]
+_AT_ONCE = 8  # measurements in one such look: a stage in lockstep has the next one ready at once
 _WATCH_PERIOD = 0.05  # between two looks at an answer that waits [s]
 _IDLE_PATIENCE = 0.04  # for a reference without which nothing is lost [s]
 _SILENCE = 0.5  # without a sample for this long the stage is taken for stopped [s]
@@ -344,7 +345,10 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         )
 
     def _serve_by_hand(self) -> None:
-        """What the executor does for the loop and who stops it, while that is not there."""
+        """What the executor does for the loop and who stops it, while that is not there.
+
+        It returns, however fast measurements come.
+        """
         for service in self._by_hand:
             with service.handle:
                 request, header = service.handle.service_take_request(service.srv_type.Request)
@@ -352,9 +356,13 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
                 response = service.callback(request, service.srv_type.Response())
                 service.send_response(response, header)
         self._take_references()
-        with self._measurements.handle:
-            while taken := self._measurements.handle.take_message(SAMPLE_TOPICS[MEASUREMENT], True):
-                self._measurements.callback(taken[0])
+        measurements = self._measurements
+        with measurements.handle:
+            for _ in range(_AT_ONCE):
+                taken = measurements.handle.take_message(SAMPLE_TOPICS[MEASUREMENT], True)
+                if taken is None:
+                    return
+                measurements.callback(taken[0])
 
     def diagnose(self) -> tuple[bytes, str, Mapping[str, object]]:
         """ERROR in a fault and in a landing nobody asked for."""
