@@ -133,12 +133,12 @@ def test_mixed_modes_are_refused(nodes: Nodes, name: str, stage: str) -> None:
 def test_nothing_hurries_after_the_end_and_a_dead_controller_is_noticed(
     nodes: Nodes, watching: Observer
 ) -> None:
-    graph = fly(nodes, 'duration:=0.5', 'timeout:=4.0', plant=('answer_timeout:=3.0',))
-    watching.wait(lambda: watching.newest(REFERENCE) is not None)
+    graph = fly(nodes, LONG, 'timeout:=4.0', plant=('answer_timeout:=3.0',))
+    watching.wait(lambda: airborne(watching))
+    assert watching.call('/reference/land').success
     watching.wait(lambda: phase(watching) == Reference.END)
     samples(watching, 1100)
     watching.wait(lambda: idles(watching), timeout=10.0)
-    assert watching.set_parameters('reference', duration=200.0).successful  # to be seen in flight
     assert watching.call('/reference/lift_off').success
     watching.wait(lambda: airborne(watching), timeout=10.0)
 

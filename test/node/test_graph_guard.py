@@ -20,6 +20,9 @@ from maglev_node.place import Place
 
 machines, at_end = count(1000), ExitStack()
 OTHER = SimpleNamespace(node_namespace='/', node_name='other')
+NAMELESS = SimpleNamespace(
+    node_namespace='_NODE_NAMESPACE_UNKNOWN_', node_name='_NODE_NAME_UNKNOWN_'
+)
 HOLDING = """
 from maglev_node.place import Place
 place = Place()
@@ -68,6 +71,22 @@ def test_what_another_publishes_is_not_claimed() -> None:
     node: Any = Node()
     node.publishers = [OTHER]
     with pytest.raises(NodeError, match="/stage/currents is already published by '/other'"):
+        GraphGuard(node).claim('stage/currents', 'controller')
+
+
+def test_what_a_nameless_one_publishes_is_not_claimed_and_its_name_is_waited_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    node: Any = Node()
+    seen = iter([[NAMELESS], [NAMELESS], [OTHER]])
+    monkeypatch.setattr(node, 'get_publishers_info_by_topic', lambda _topic: next(seen))
+    with pytest.raises(NodeError, match="is already published by '/other'"):
+        GraphGuard(node).claim('stage/currents', 'controller')
+    assert not list(seen)
+    monkeypatch.setattr(graph_guard, '_PROBATION', 0.1)
+    node = Node()
+    node.publishers = [NAMELESS]
+    with pytest.raises(NodeError, match='by a node whose name is not discovered yet: there is'):
         GraphGuard(node).claim('stage/currents', 'controller')
 
 

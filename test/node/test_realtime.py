@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from graph import executable
 
+from maglev_node.realtime import take_processors
 from maglev_node.topics import KEPT
 
 UNHEARD = Path(__file__).resolve().parents[1] / 'support' / 'unheard.py'
@@ -102,3 +105,40 @@ def test_under_a_limit_memory_is_left_alone() -> None:
         'assert not lock_memory()'
     )
     assert subprocess.run([sys.executable, '-c', limited], check=False).returncode == 0
+
+
+def test_all_threads_run_where_they_are_told_to_and_those_begun_later() -> None:
+    code = """
+import os, threading
+from pathlib import Path
+from maglev_node.realtime import take_processors
+
+chosen, end = max(os.sched_getaffinity(0)), threading.Event()
+threading.Thread(target=end.wait).start()
+take_processors((chosen,))
+threading.Thread(target=end.wait).start()
+threads = [int(entry.name) for entry in Path('/proc/self/task').iterdir()]
+found = [os.sched_getaffinity(thread) for thread in threads]
+end.set()
+assert len(found) > 2 and all(one == {chosen} for one in found), found
+"""
+    subprocess.run([sys.executable, '-c', code], check=True)
+
+
+def test_told_nothing_they_run_anywhere() -> None:
+    before = os.sched_getaffinity(0)
+    take_processors(())
+    assert os.sched_getaffinity(0) == before
+
+
+def test_a_processor_that_is_not_there_is_refused_in_one_line() -> None:
+    """By a node: what may be allowed to it is known where it runs."""
+    command = [executable('maglev_plant', 'plant'), '--ros-args', '-p', 'processors:=[0, 4000]']
+    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)
+    may = sorted(os.sched_getaffinity(0))
+    assert done.returncode == 1
+    assert done.stdout == ''
+    assert done.stderr == (
+        "plant: error: parameter 'processors' is [0, 4000], it must be of those this process may"
+        f' run on: {may}\n'
+    )

@@ -49,13 +49,14 @@ def run(scenario: str, out: Path, *options: str) -> subprocess.CompletedProcess[
 def soon(folder: Path) -> str:
     """A parameter file with which what is measured begins early, and lands soon after.
 
-    So soon, and in real time, the law need not be better than the paper's.
+    So soon, and in real time, the law need not be better than the paper's. Lift-off waits until
+    who looks on is there, on a busy machine too.
     """
     chosen = folder / 'soon.yaml'
     mean = [57e-6, 94e-6, 93e-6, 150e-6, 150e-6]
     chosen.write_text(
         'reference: {ros__parameters: {run_in: 1.0, move_time: 0.4,'
-        ' lift_off: {time: 0.5, settle: 0.0}, landing: {time: 0.5, crawl_distance: 1.0e-4}}}\n'
+        ' lift_off: {wait: 3.0, time: 0.5, settle: 0.0}, landing: {time: 0.5, crawl_distance: 1.0e-4}}}\n'
         f'monitor: {{ros__parameters: {{limits: {{max_mean_error: {mean},'
         f' max_error: [-1.0, -1.0, -1.0, -1.0, -1.0]}}}}}}\n'
     )

@@ -25,6 +25,7 @@ _LOOK_PERIOD = 0.25  # [s]
 _PAUSE = 0.02  # between two looks of who waits [s]
 _MATCHING = 0.1  # at most, from when the graph shows a subscription to when it gets messages [s]
 _REMINDER = 5.0  # between two lines about who is waited for [s]
+_NAMELESS = '_NODE_NAME_UNKNOWN_'  # to the middleware, whose publishers are discovered before names
 
 
 class GraphGuard:
@@ -71,12 +72,13 @@ class GraphGuard:
         name = f'{self._node.context.get_domain_id()} {self._node.resolve_topic_name(topic)}'
         until = time.monotonic() + _PROBATION
         while True:
+            over = time.monotonic() > until
             publishers = self._node.get_publishers_info_by_topic(topic)
-            if publishers:
+            if publishers and (over or publishers[0].node_name != _NAMELESS):
                 raise NodeError(self._taken(topic, kind, publishers[0]))
-            if self._place.take(name):
+            if not publishers and self._place.take(name):
                 return
-            if time.monotonic() > until:
+            if over:
                 raise NodeError(self._taken(topic, kind))
             time.sleep(_PAUSE)
 
@@ -103,7 +105,9 @@ class GraphGuard:
 
     def _taken(self, topic: str, kind: str, who: TopicEndpointInfo | None = None) -> str:
         whom = 'a process on this machine'
-        if who is not None:
+        if who is not None and who.node_name == _NAMELESS:
+            whom = 'a node whose name is not discovered yet'
+        elif who is not None:
             whom = f"'{who.node_namespace.rstrip('/')}/{who.node_name}'"
         return (
             f'{self._node.resolve_topic_name(topic)} is already published by {whom}: there is'

@@ -38,6 +38,12 @@ class NodeParameters:
     effective_parameters: str = parameter(
         '', 'file to write the parameters in effect to; empty: none', read_only=True
     )
+    processors: tuple[int, ...] = parameter(
+        (),
+        'processors that the threads of the process may run on; empty: any',
+        within=(0, 4095),
+        read_only=True,
+    )
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -81,6 +87,7 @@ class MaglevNode(PollingNode, Generic[P]):
         self.at_end = ExitStack()
         """What is closed with the node, after its publishers and all."""
         self.parameters: P = ros_parameters.declare(self, name, parameter_table)
+        realtime.take_processors(self.parameters.processors)
         self.add_on_set_parameters_callback(self._on_set_parameters)
         self.steady_clock = Clock(clock_type=ClockType.STEADY_TIME)
         self.finished: Future = Future()

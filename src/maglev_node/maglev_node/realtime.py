@@ -6,8 +6,11 @@ import ctypes
 import os
 import resource
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
+
+from maglev_model.parameters import ParameterError
 
 _SPINNING = 'dds.asyn'
 """Threads of Fast DDS that ask for a writer's lock again and again, without a pause."""
@@ -41,6 +44,22 @@ def take_priority(priority: int) -> bool:
     except OSError:
         return False
     return True
+
+
+def take_processors(processors: Sequence[int]) -> None:
+    """Let all threads of this process run on these only, and those they begin; empty: as before.
+
+    Raises ParameterError where the process may not run on one of them.
+    """
+    may = os.sched_getaffinity(0)
+    if not may.issuperset(processors):
+        raise ParameterError(
+            f"parameter 'processors' is {list(processors)}, it must be of those this process may"
+            f' run on: {sorted(may)}'
+        )
+    for thread in _threads() if processors else ():
+        with suppress(OSError):  # it has ended
+            os.sched_setaffinity(int(thread.name), processors)
 
 
 def give_priority_back() -> None:
