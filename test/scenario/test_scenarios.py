@@ -56,7 +56,8 @@ def soon(folder: Path) -> str:
     mean = [57e-6, 94e-6, 93e-6, 150e-6, 150e-6]
     chosen.write_text(
         'reference: {ros__parameters: {run_in: 1.0, move_time: 0.4,'
-        ' lift_off: {wait: 3.0, time: 0.5, settle: 0.0}, landing: {time: 0.5, crawl_distance: 1.0e-4}}}\n'
+        ' lift_off: {wait: 3.0, time: 0.5, settle: 0.0},'
+        ' landing: {time: 0.5, crawl_distance: 1.0e-4}}}\n'
         f'monitor: {{ros__parameters: {{limits: {{max_mean_error: {mean},'
         f' max_error: [-1.0, -1.0, -1.0, -1.0, -1.0]}}}}}}\n'
     )
