@@ -1,12 +1,15 @@
 #!/usr/bin/env python3
 """The ellipse in real time behind the emulated bridge for half an hour, on a machine that works.
 
-    python benchmarks/soak.py [--minutes M] [--stage hw_bridge|plant] [--idle] [--out DIR]
+    python benchmarks/soak.py [--minutes M] [--stage hw_bridge|plant] [--idle] [--apart] [--out DIR]
 
 Beside it, unless ``--idle``: a busy process for each core, one that fills and frees 400 MB over and
 over, two strangers on every topic of the stage, and 20 MB a second of somebody else's messages. One
 of the strangers is stopped for some seconds once, early: what publishers keep for a reader that
 lags, at most, they have from then on, and what grows afterwards is something else.
+
+With ``--apart`` the stage has the first processor for its own among the nodes, and all others of
+the loop share the rest; the load is wherever the kernel puts it.
 
 Prints memory of each node at the beginning and the end, how it and the open files grew, late
 samples and errors, and beside them how late the machine itself was: what keeps a bare thread of the
@@ -116,9 +119,18 @@ def load(*, idle: bool) -> Iterator[list[subprocess.Popen[bytes]]]:
             process.wait()
 
 
+def apart(stage: str) -> str:
+    """Parameters with which the stage runs on another processor than the rest of the graph."""
+    first, *others = sorted(os.sched_getaffinity(0))
+    return ''.join(
+        f'{nodes}:\n  ros__parameters:\n    processors: {where}\n'
+        for nodes, where in (('/**', others or [first]), (stage, [first]))
+    )
+
+
 def fly(asked: argparse.Namespace, out: Path, limits: Path) -> dict[str, list[Look]]:
     """The scenario, and what its nodes held all along."""
-    limits.write_text(LIMITS, encoding='utf-8')
+    limits.write_text(LIMITS + (apart(asked.stage) if asked.apart else ''), encoding='utf-8')
     command = [str(ROOT / 'scenarios' / 'ellipse.sh'), '--mode', 'realtime']
     command += ['--stage', asked.stage, '--duration', str(60.0 * asked.minutes)]
     command += ['--params', str(limits), '--quiet', '--out', str(out)]
@@ -189,6 +201,7 @@ def main() -> int:
     parser.add_argument('--minutes', type=float, default=30.0)
     parser.add_argument('--stage', choices=('hw_bridge', 'plant'), default='hw_bridge')
     parser.add_argument('--idle', action='store_true', help='nothing else at work')
+    parser.add_argument('--apart', action='store_true', help='the stage has its own processor')
     parser.add_argument('--out', type=Path, help='where the run is left; forgotten otherwise')
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:

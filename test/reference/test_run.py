@@ -59,13 +59,76 @@ def test_an_answered_sample_counts_though_its_measurement_was_not_seen(answered,
     assert run.newest == 1000
 
 
+def flying_at(sequence):
+    """Its lift-off is published, and the stage has got there."""
+    run = run_at(sequence)
+    rest = round(PARAMETERS.lift_off.wait / PARAMETERS.sample_time)
+    for newest in range(sequence, sequence + rest + 1, 10):
+        run.observe(newest)
+        run.due()
+    run.enter_phase()
+    assert run.phase == Phase.LIFT_OFF
+    return run
+
+
 def test_after_a_gap_it_catches_up_in_bursts():
-    run = run_at(0)
-    run.due()
-    run.observe(300)
+    run = flying_at(0)
+    run.observe(run.newest + 300)
     counts = [len(run.due()[1].phase) for _ in range(3)]
     assert counts == [128, 128, 44]
     assert run.due() is None
+
+
+@pytest.mark.parametrize('published', [False, True], ids=['at once', 'then'])
+def test_held_up_before_lift_off_it_rests_on(published):
+    """As by a busy machine: a controller cannot follow a lift-off that lies behind it."""
+    run = run_at(747)
+    if published:
+        assert run.due()[0] == 747
+    next_one = run.newest + run.ahead + 1
+    run.observe(1063)
+    run.observe_controller(Mode.WAITING, 1060)
+    assert run.give_way() == ''
+    first, block = run.due()
+    assert first == 1063
+    assert len(block.phase) == 64
+    assert (block.phase == Phase.REST).all()
+    entered = []
+    for newest in range(1064, 1400):
+        run.observe(newest)
+        run.observe_controller(Mode.WAITING, newest - 1)
+        run.due()
+        if run.enter_phase():
+            entered.append(newest)
+            break
+    rest = round(PARAMETERS.lift_off.wait / PARAMETERS.sample_time)
+    assert entered == [747 + rest + 1063 - next_one]
+    assert run.phase == Phase.LIFT_OFF
+
+
+def test_what_has_come_in_time_shifts_nothing():
+    run = run_at(747)
+    run.due()
+    rest = round(PARAMETERS.lift_off.wait / PARAMETERS.sample_time)
+    for newest in range(747 + 64, 747 + rest, 64):  # the first that is not published, each time
+        run.observe(newest)
+        assert run.due()[0] == newest
+    for newest, phase in ((747 + rest - 1, Phase.REST), (747 + rest, Phase.LIFT_OFF)):
+        run.observe(newest)
+        run.enter_phase()
+        assert run.phase == phase
+
+
+def test_where_a_lift_off_was_published_nothing_rests_on():
+    run = run_at(747)
+    rest = round(PARAMETERS.lift_off.wait / PARAMETERS.sample_time)
+    for newest in range(747, 747 + rest - 50, 10):
+        run.observe(newest)
+        run.due()
+    assert run.newest + run.ahead >= 747 + rest
+    run.observe(5000)
+    run.observe_controller(Mode.WAITING, 747 + rest)
+    assert run.give_way() == 'the controller does not follow'
 
 
 def test_phases_are_those_of_the_stages_sample():
@@ -85,12 +148,10 @@ def test_phases_are_those_of_the_stages_sample():
 
 
 def test_another_stage_is_waited_for_anew_but_not_while_the_platen_flies():
-    run = run_at(5000)
-    run.observe(5400)
-    run.enter_phase()
-    assert run.phase == Phase.LIFT_OFF
+    run = flying_at(5000)
+    newest = run.newest
     assert not run.observe(3)
-    assert (run.newest, run.started) == (5400, True)
+    assert (run.newest, run.started) == (newest, True)
     assert run.land()
     run.observe(9999)
     run.enter_phase()

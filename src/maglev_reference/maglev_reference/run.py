@@ -99,7 +99,24 @@ class ReferenceRun:
             self._timeline, self._next = None, 0
             self.autostart, self.phase, self.left = False, Phase.REST, ''
         self.newest = sequence
+        self._rest_on()
         return True
+
+    def _rest_on(self) -> None:
+        """Before lift-off, rest longer where the stage has gone past all that was published.
+
+        Whoever was held up so long would else publish a lift-off that should have begun already,
+        and which no controller follows from its middle.
+        """
+        behind = self.newest - self._origin - self._next
+        if behind > 0 and self._resting:
+            self._origin += behind
+
+    @property
+    def _resting(self) -> bool:
+        """Whether nothing but the rest before a lift-off was published."""
+        last = max(self._next - 1, 0)
+        return self._timeline is not None and self._timeline.phase(last) == Phase.REST
 
     def plan(self, rest: FloatArray) -> Timeline:
         """What to :meth:`start`, the platen at rest at ``rest`` (5,) [m, rad].
