@@ -179,34 +179,36 @@ def test_into_the_flight_of_another_controller_none_speaks(
     assert controller.output.count('silent') == 1
 
 
-def designing(controller: Process) -> int | None:
-    """The process in which it designs, if there is one."""
-    with contextlib.suppress(OSError):  # a thread or a process has ended meanwhile
-        for children in Path(f'/proc/{controller.pid}/task').glob('*/children'):
-            for child in map(int, children.read_text().split()):
-                if 'design' in Path(f'/proc/{child}/cmdline').read_text('utf-8'):
-                    return child
-    return None
+DESIGN_STOPS = """
+import os, signal, sys
+if 'maglev_controller.design_process' in sys.orig_argv[-1]:
+    os.kill(os.getpid(), signal.SIGSTOP)
+"""
 
 
-def stop_designing(controller: Process) -> int:
-    """Stop that process, however short it lives, as soon as there is one."""
+def stopped_design(controller: Process) -> int:
+    """The process in which it designs, once that has stopped itself."""
     deadline = time.monotonic() + 60.0
     while time.monotonic() < deadline:
-        child = designing(controller)
-        if child is not None:
-            os.kill(child, signal.SIGSTOP)
-            return child
-        time.sleep(0.002)
+        with contextlib.suppress(OSError):  # a thread has ended meanwhile
+            for children in Path(f'/proc/{controller.pid}/task').glob('*/children'):
+                for child in children.read_text().split():
+                    if ') T ' in Path(f'/proc/{child}/stat').read_text('utf-8'):
+                        return int(child)
+        time.sleep(0.01)
     raise AssertionError(f'it never designed:\n{controller.output}')
 
 
-def test_during_a_redesign_the_emergency_stop_is_served(nodes: Nodes, watching: Observer) -> None:
+def test_during_a_redesign_the_emergency_stop_is_served(
+    nodes: Nodes, watching: Observer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / 'sitecustomize.py').write_text(DESIGN_STOPS)
+    monkeypatch.setenv('PYTHONPATH', f'{tmp_path}:{os.environ["PYTHONPATH"]}')
     controller = fly(nodes, watching)['controller']
     client = watching.node.create_client(Trigger, '/controller/emergency_stop')
     watching.make_heard(client)
     changing = watching.begin_to_set('controller', y__bandwidth=180.0)
-    design = stop_designing(controller)
+    design = stopped_design(controller)
     watching.ask(client, Trigger.Request())
     assert not changing.done()
     os.kill(design, signal.SIGCONT)
