@@ -199,6 +199,18 @@ def test_two_stages_at_once_one_of_them_remapped(
     assert plant.wait() == 0, plant.output
 
 
+def test_a_processor_that_is_not_there_is_refused_in_one_line() -> None:
+    command = [executable('maglev_plant', 'plant'), '--ros-args', '-p', 'processors:=[0, 4000]']
+    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)
+    may = sorted(os.sched_getaffinity(0))
+    assert done.returncode == 1
+    assert done.stdout == ''
+    assert done.stderr == (
+        "plant: error: parameter 'processors' is [0, 4000], it must be of those this process may"
+        f' run on: {may}\n'
+    )
+
+
 NODES = ('plant', 'hw_bridge', 'controller', 'reference', 'monitor', 'recorder', 'watchers')
 
 

@@ -9,7 +9,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from graph import executable
 
 from maglev_node.realtime import take_processors
 from maglev_node.topics import KEPT
@@ -129,16 +128,3 @@ def test_told_nothing_they_run_anywhere() -> None:
     before = os.sched_getaffinity(0)
     take_processors(())
     assert os.sched_getaffinity(0) == before
-
-
-def test_a_processor_that_is_not_there_is_refused_in_one_line() -> None:
-    """By a node: what may be allowed to it is known where it runs."""
-    command = [executable('maglev_plant', 'plant'), '--ros-args', '-p', 'processors:=[0, 4000]']
-    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)
-    may = sorted(os.sched_getaffinity(0))
-    assert done.returncode == 1
-    assert done.stdout == ''
-    assert done.stderr == (
-        "plant: error: parameter 'processors' is [0, 4000], it must be of those this process may"
-        f' run on: {may}\n'
-    )

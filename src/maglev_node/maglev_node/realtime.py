@@ -51,13 +51,15 @@ def take_processors(processors: Sequence[int]) -> None:
 
     Raises ParameterError where the process may not run on one of them.
     """
+    if not processors:
+        return
     may = os.sched_getaffinity(0)
     if not may.issuperset(processors):
         raise ParameterError(
             f"parameter 'processors' is {list(processors)}, it must be of those this process may"
             f' run on: {sorted(may)}'
         )
-    for thread in _threads() if processors else ():
+    for thread in _threads():
         with suppress(OSError):  # it has ended
             os.sched_setaffinity(int(thread.name), processors)
 
