@@ -197,6 +197,7 @@ def test_doubted_for_too_long_it_is_stuck(encoder: int, way: float) -> None:
         watched = hovering()
         watched.disturbance[:] = 9.0
         watched.unseen[encoder] = way * share * largest
+        watched.residual_then[:] = largest  # which four gaps show too
         doubted = (np.arange(6) == encoder) & doubtful
         assert find_stuck(watched.block[0], doubted, UNSEEN) is stuck
         assert watched.trust.tolist() == [LOST * (stuck and i == encoder) for i in range(6)]
@@ -214,6 +215,33 @@ def watched_limit(encoder: int) -> float:
     """How far an encoder may be missed [m]."""
     fault = PARAMETERS.fault
     return fault.stuck_gap if encoder < 4 else fault.stuck_horizontal
+
+
+@pytest.mark.parametrize(
+    ('unseen', 'shown', 'rigid', 'stuck'),
+    [
+        ((82e-6, -23e-6, 83e-6, 201e-6), 0.0, True, []),
+        ((82e-6, -23e-6, 83e-6, 201e-6), 99e-6, True, []),
+        ((82e-6, -23e-6, 83e-6, 201e-6), 102e-6, True, [3]),
+        ((82e-6, -23e-6, 83e-6, 201e-6), 0.0, False, [3]),
+        ((201e-6, -23e-6, 201e-6, 420e-6), 0.0, True, [0, 2, 3]),
+        ((201e-6, -23e-6, 199e-6, 290e-6), 0.0, True, [0, 3]),
+        ((201e-6, -23e-6, 199e-6, 305e-6), 0.0, True, []),
+    ],
+)
+@pytest.mark.parametrize('x', [False, True])
+def test_one_of_several_is_not_done_without_where_four_gaps_deny_that_it_alone_is_stuck(
+    unseen: tuple[float, ...], shown: float, rigid: bool, stuck: list[int], x: bool
+) -> None:
+    """As where a phase is dead and the platen hangs still within a count for a while."""
+    watched = hovering()
+    watched.rigid, watched.unseen[:4], watched.residual_then[:] = rigid, unseen, shown
+    watched.unseen[4] = 1.01 * watched_limit(4) * x
+    doubted = np.abs(watched.unseen) > 2.5e-5
+    wanted = stuck + [4] * x
+    assert find_stuck(watched.block[0], doubted, UNSEEN) is bool(wanted)
+    assert np.flatnonzero(watched.blamed).tolist() == wanted
+    assert np.flatnonzero(watched.trust == LOST).tolist() == wanted
 
 
 @pytest.mark.parametrize('share', [0.49, 0.51])

@@ -108,15 +108,16 @@ def _residual_since(g: GuardArrays, i: int) -> float:
 
 
 @borrowing
-def _denied(g: GuardArrays, doubted: Flags) -> bool:
+def _denied(g: GuardArrays, doubted: Flags, share: float) -> bool:
     """Whether four gaps go on being those of a rigid platen that the motion in doubt would tilt.
 
-    Were those that are doubted stuck, they would contradict the others by what they do not show.
-    It is the model that is wrong then, as where a phase is dead.
+    Were those stuck that are doubted and missed by more than a ``share`` of max_unseen, they would
+    contradict the others by what they do not show. It is the model that is wrong then, as where a
+    phase is dead.
     """
     missing = shown = 0.0
     for i in range(4):
-        if g.rigid and doubted[i]:
+        if g.rigid and doubted[i] and abs(g.unseen[i]) > share * g.max_unseen[i]:
             missing += g.unseen[i] if i % 2 == 0 else -g.unseen[i]
             shown = max(shown, _residual_since(g, i))
     return bool(abs(missing) > _DENIED and shown < 0.5 * abs(missing))
@@ -145,7 +146,7 @@ def doubt(g: GuardArrays, flying: bool, doubted: Flags) -> int:
             agreed = agreed and (doubted[i] or abs(g.believed[i] - g.length[i]) <= _AGREED)
             contradicted += int(_residual_since(g, i) > _DOUBTFUL_RESIDUAL)
     credible = agreed or certain or (unseen == 1 and g.rigid)
-    if unseen > 0 and credible and not _denied(g, doubted):
+    if unseen > 0 and credible and not _denied(g, doubted, 0.0):
         return UNSEEN
     told = contradicted == 1 or contradicted == 2
     for i in range(4):
@@ -184,10 +185,15 @@ def listen(g: GuardArrays) -> None:
 
 @borrowing
 def find_stuck(g: GuardArrays, doubted: Flags, doubt: int) -> bool:
-    """Do without the encoders that are doubted for too long; whether there are new ones."""
+    """Do without the encoders that are doubted for too long; whether there are new ones.
+
+    Several that stand still may all be stuck where the first of them alone cannot be: that is not
+    done without before the others, and by then those may have counted.
+    """
     found = False
+    denied = doubt == UNSEEN and _denied(g, doubted, 1.0)
     for i in range(6):
-        gone = abs(g.unseen[i]) > g.max_unseen[i]
+        gone = abs(g.unseen[i]) > g.max_unseen[i] and not (denied and i < 4)
         if i < 4 and doubt == CONTRADICTED:
             gone = _residual_since(g, i) > 0.5 * g.max_unseen[i]
         if doubted[i] and gone:
