@@ -345,10 +345,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         )
 
     def _serve_by_hand(self) -> None:
-        """What the executor does for the loop and who stops it, while that is not there.
-
-        It returns, however fast measurements come.
-        """
+        """What the executor does for the loop and who stops it, while it is away; never long."""
         for service in self._by_hand:
             with service.handle:
                 request, header = service.handle.service_take_request(service.srv_type.Request)
@@ -356,13 +353,12 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
                 response = service.callback(request, service.srv_type.Response())
                 service.send_response(response, header)
         self._take_references()
-        measurements = self._measurements
-        with measurements.handle:
+        with self._measurements.handle:
             for _ in range(_AT_ONCE):
-                taken = measurements.handle.take_message(SAMPLE_TOPICS[MEASUREMENT], True)
+                taken = self._measurements.handle.take_message(SAMPLE_TOPICS[MEASUREMENT], True)
                 if taken is None:
                     return
-                measurements.callback(taken[0])
+                self._measurements.callback(taken[0])
 
     def diagnose(self) -> tuple[bytes, str, Mapping[str, object]]:
         """ERROR in a fault and in a landing nobody asked for."""
