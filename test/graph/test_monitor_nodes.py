@@ -153,6 +153,7 @@ def test_in_one_process_recorder_and_monitor_do_as_they_do_apart(
     feeder.feed()
     observer.wait((nodes.folder / 'metrics.json').is_file)
     assert watchers.running  # who records until all have ended
+    assert feeder.delivered(5.0)
     watchers.signal(signal.SIGINT)
     assert watchers.wait() == 0, watchers.output
     assert recorded(nodes.folder / 'bag') == dict.fromkeys(TOPICS, SAMPLES)
