@@ -70,12 +70,21 @@ def test_refused(name: str, value: object, match: str) -> None:
         build(PlantParameters, {name: value})
 
 
-def test_the_substeps_asked_for_are_enough() -> None:
-    stiff = {'guide.coulomb_velocity': (1e-5,) * 5}
+@pytest.mark.parametrize(
+    'stiff',
+    [
+        {'guide.coulomb_velocity': (1e-5,) * 5},
+        {'effects.friction.vertical_guides': (20.0,) * 4},
+        {'effects.friction.vertical_guides': (0.0, 40.0, 0.0, 40.0)},
+    ],
+)
+def test_the_substeps_asked_for_are_enough(stiff: dict[str, object]) -> None:
     with pytest.raises(ParameterError) as refusal:
         build(PlantParameters, stiff)
     needed = int(str(refusal.value).rsplit(' ', 1)[1])
     assert build(PlantParameters, {**stiff, 'substeps': needed}).substeps == needed
+    other = {'effects.friction.model': 'lugre'}
+    assert build(PlantParameters, {**stiff, **other}).effects.friction.model == 'lugre'
 
 
 def test_offsets_change_the_true_plant_only() -> None:

@@ -6,7 +6,7 @@ import dataclasses
 import math
 from typing import Any
 
-from maglev_model.axes import AXES
+from maglev_model.axes import AXES, PHI, THETA, Y
 from maglev_model.guide import GuideParameters
 from maglev_model.machine import MachineParameters
 from maglev_model.parameters import ParameterError, group, parameter
@@ -224,11 +224,24 @@ class PlantParameters:
                 f'and its seats reach {reach:g} m further'
             )
 
+    def _guides_rates(self) -> list[tuple[int, float]]:
+        """How fast the guides at the motors brake y, phi and theta, beginning to slide [1/s]."""
+        forces, machine = self.effects.friction.vertical_guides, self.machine
+        slope = 1.0 / self.guide.coulomb_velocity[Y]
+        tilt = slope * machine.radius**2 / machine.inertia
+        return [
+            (Y, slope * sum(forces) / machine.mass_y),
+            (PHI, tilt * (forces[0] + forces[2])),
+            (THETA, tilt * (forces[1] + forces[3])),
+        ]
+
     def _check_substeps(self) -> None:
         guide = self.guide
         smooth = self.effects.friction.model == 'tanh'
         friction = zip(guide.coulomb, guide.coulomb_velocity, guide.viscous, strict=True)
         rates = [smooth * coulomb / velocity + viscous for coulomb, velocity, viscous in friction]
+        for axis, rate in self._guides_rates():
+            rates[axis] += smooth * rate
         needed = math.ceil(max(rates) * self.sample_time / _LONGEST_STEP)
         if self.substeps < needed:
             raise ParameterError(
