@@ -82,7 +82,7 @@ class MadeUpStage:
         return cleared, 'cleared'
 
     def deactivate(self) -> None:
-        self._call('deactivate')
+        self.calls.append('deactivate')
 
     def close(self) -> None:
         self._call('close')
@@ -120,6 +120,20 @@ def test_lockstep_repeats_the_first_sample_and_waits_for_each_answer() -> None:
     node.answer(currents(6))
     assert node.measured == [5, 5, 5, 6, 7]
     assert (sampling.sequence, sampling.late_samples) == (7, 0)
+
+
+def test_a_stage_without_a_first_sample_is_not_left_active() -> None:
+    stage = MadeUpStage()
+    fine = stage.activate
+
+    def activate() -> None:
+        fine()
+        stage.failing = True
+
+    stage.activate = activate  # type: ignore[method-assign]
+    with pytest.raises(StageError, match='it is gone'):
+        start(stage)
+    assert stage.calls == ['activate', 'read', 'deactivate']
 
 
 def test_the_first_answer_waits_for_those_who_watch() -> None:

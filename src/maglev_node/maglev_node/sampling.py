@@ -63,7 +63,11 @@ class Sampling(Generic[P, S]):
         self.answered = self._lost = False
         self.controller.forget()
         self._newest = -1
-        self._sample = self.stage.read()
+        try:
+            self._sample = self.stage.read()
+        except StageError:
+            self.stage.deactivate()
+            raise
         self.sequence += 1
         self._sample_time = time.monotonic()
         self._publisher.start()
