@@ -185,9 +185,6 @@ class BridgeLandingParameters:
         within=(1e-5, 0.1),
         length=5,
     )
-    rate_bandwidth: float = parameter(
-        800.0, 'bandwidth of the rate estimate', unit='rad/s', within=(10.0, 2000.0)
-    )
     current: float = parameter(5.0, 'largest current of a motor', unit='A', within=(0.1, 100.0))
 
 
