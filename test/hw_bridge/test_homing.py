@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+
+import numpy as np
 import pytest
 from made_up import Clock, refusing
 from wired import bridge
@@ -92,3 +95,30 @@ def test_a_fault_of_the_lift_is_told_and_stays() -> None:
     assert stage.fault is not None
     assert stage.fault.kind == 'stop'
     assert not stage.encoders.homed
+
+
+def test_at_the_ends_of_its_guides_it_is_homed_and_flown_only_away_from_them() -> None:
+    stage, boards = bridge(homing__at_start=False, homing__x=-0.05, homing__z=-0.05)
+    boards.rig.place(np.array([0.031, -0.05, -0.05, 0.0, 0.0]))
+    boards.tick()
+    stage.configure()
+    stage.home()
+    assert stage.encoders.homed
+    assert stage.fault is None
+    stage.activate()
+    for _ in range(3):
+        stage.read()
+        stage.write(np.full(4, 0.1), np.zeros(4))
+    assert stage.fault is not None
+    assert re.fullmatch(r'x is -(48|49|50)\.\d+ mm, outside its soft range', stage.fault.reason)
+
+
+def test_what_keeps_it_from_a_lift_is_all_that_is_said() -> None:
+    stage, boards = bridge(homing__at_start=False)
+    stage.configure()
+    boards.stop_pressed = True
+    boards.tick()
+    with pytest.raises(HomingError, match=r'^the platen cannot be lifted: the emergency stop is p'):
+        stage.home()
+    assert not stage.encoders.homed
+    assert stage.fault is None

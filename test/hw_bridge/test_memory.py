@@ -164,3 +164,26 @@ def test_whatever_opening_raises_gives_everything_back(
     again = kept(tmp_path / 'boards.json')
     again.configure()  # nobody holds them
     again.close()
+
+
+@pytest.mark.parametrize('active', [False, True])
+def test_what_is_latched_after_a_restart_can_be_cleared_and_the_stage_homed(
+    tmp_path: Path, active: bool
+) -> None:
+    first = kept(tmp_path / 'boards.json', homing__at_start=False)
+    first.configure()
+    first.memory.keep(np.zeros(12), Fault('stale', 'for a test', 'none', False), active=active)
+    first.memory.release()  # as the system does for a process that is killed
+    again = kept(tmp_path / 'boards.json', homing__at_start=False)
+    again.configure()
+    assert again.fault is not None
+    if active:  # its amplifiers count as hot
+        again.amplifiers.arrays.load[:] = 0.0
+    assert again.reset()[0]
+    assert again.mode is Mode.READY
+    with pytest.raises(StageError, match='not homed'):
+        again.activate()
+    again.home()
+    again.activate()
+    assert again.mode is Mode.FOLLOWING
+    again.close()

@@ -195,7 +195,7 @@ def test_boards_that_are_not_disabled_are_lost(monkeypatch: pytest.MonkeyPatch) 
     stage.stop('for another')
     assert stage.mode is Mode.LOST
     assert stage.fault is not None
-    assert stage.fault.reason == 'for another'  # which came first
+    assert stage.fault.reason == 'for another; then for a test'  # which came first, first
 
 
 @pytest.mark.parametrize('after', ['landed', 'reset'])
@@ -232,14 +232,14 @@ def test_boards_that_are_lost_while_it_lands_are_the_fault_then() -> None:
     assert 'strikes the' in flight.stage.fault.reason
 
 
-def test_boards_that_are_lost_after_a_fault_are_not_what_was_found_out_first() -> None:
+def test_boards_that_are_lost_after_a_fault_are_told_after_what_was_found_out_first() -> None:
     stage, boards = active()
     stage.stop('before')
     assert stage.mode is Mode.DISABLED
     lose(stage, boards)
     assert stage.mode is Mode.LOST
     assert stage.fault is not None
-    assert stage.fault.reason == 'before'
+    assert stage.fault.reason.startswith('before; then ')
 
 
 def test_what_is_deactivated_is_remembered_so(tmp_path: Path) -> None:
@@ -280,8 +280,11 @@ def test_a_reset_says_what_it_cleared_and_begins_to_watch_anew() -> None:
     assert stage.guard.arrays.samples == 0
 
 
+@pytest.mark.parametrize('pushed', [0.0, 1e-4, 1.5e-3])
 @pytest.mark.parametrize('back', [(), (0,), (1,)])
-def test_a_board_whose_counters_came_back_as_0_has_lost_its_home(back: tuple[int, ...]) -> None:
+def test_a_board_whose_counters_began_anew_has_lost_its_home(
+    back: tuple[int, ...], pushed: float
+) -> None:
     plugs = {'board': [0, 0, 0, 0, 1, 1], 'channel': [0, 1, 2, 3, 0, 1]}
     wiring = {f'emulation__wiring__encoder_{what}': where for what, where in plugs.items()}
     given = {f'encoder__{what}': where for what, where in plugs.items()}
@@ -289,6 +292,7 @@ def test_a_board_whose_counters_came_back_as_0_has_lost_its_home(back: tuple[int
     its = np.isin(plugs['board'], back)
     lose(stage, boards)
     boards.rig._start[its] -= boards.rig.counts()[its]
+    boards.rig.place(np.array([0.031, pushed, pushed, 0.0, 0.0]))
     boards.tick()
     stage.deactivate()
     assert stage.reset()[0]
@@ -305,3 +309,43 @@ def test_boards_that_come_back_to_no_good_are_closed_again() -> None:
     assert 'emergency stop' in why
     assert stage.mode is Mode.LOST
     assert not boards.cards
+
+
+@pytest.mark.parametrize('at_rest', [False, True])
+def test_boards_that_fail_after_a_fault_do_not_hide_it(at_rest: bool) -> None:
+    flight = Flight(hover(0.025))
+    flight.run(150)
+    flight.stage.stop()
+    if at_rest:
+        flight.until_no_current()
+    else:
+        flight.run(50)
+    flight.boards.expire()
+    flight.run(2)
+    stage = flight.stage
+    assert stage.mode is Mode.LOST
+    assert stage.fault is not None
+    assert stage.fault.cut
+    assert stage.fault.kind == stage.why if not at_rest else 'watchdog'
+    assert stage.fault.reason.startswith('emergency stop; then ')
+    assert 'expired' in stage.fault.reason
+    assert ('strikes' in stage.fault.reason) != at_rest
+    assert stage.fault.remedy.endswith('; see to the boards')
+    for _ in range(2):  # and once is enough
+        flight.boards.failing = True
+        assert not stage.reset()[0]
+    assert stage.fault.reason.count('; then ') == 1
+
+
+def test_boards_lost_in_flight_begin_anew_where_the_platen_is_then() -> None:
+    flight = Flight(hover(0.025, 0.005))
+    flight.run(150)
+    flight.boards.expire()
+    flight.run(2)
+    assert flight.stage.mode is Mode.LOST
+    flight.rig.place(np.array([0.031, 0.005, 0.0, 0.0, 0.0]))
+    flight.boards.tick()
+    assert flight.stage.reset()[0]
+    flight.run(20, controlled=False)
+    assert flight.stage.fault is None
+    assert flight.stage.mode is Mode.FOLLOWING

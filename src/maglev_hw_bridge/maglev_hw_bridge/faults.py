@@ -12,6 +12,7 @@ from maglev_hw_bridge.landing import impacts_of_cut
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES, PHASE_NAMES
 from maglev_model.axes import AXES
+from maglev_model.stage import Fault
 
 FloatArray = NDArray[np.float64]
 
@@ -117,6 +118,16 @@ def stray_fault() -> tuple[str, str]:
     """Reason and remedy of a landing that is given up, as the amplifiers do not hold the platen."""
     reason = 'the platen left its way down, pulled by what was not commanded'
     return reason, 'check the amplifiers, one may be stuck on, and the encoders'
+
+
+def then(first: Fault, second: Fault) -> Fault:
+    """A fault with which another one ended: both are said, and an encoder may be homed."""
+    return Fault(
+        first.kind if first.kind == 'encoder' else second.kind,
+        f'{first.reason}; then {second.reason}',
+        f'{first.remedy}; {second.remedy}',
+        second.cut,
+    )
 
 
 def remaining_cause(

@@ -29,6 +29,9 @@ from maglev_model.stage import STOPPED_SINCE, EncoderSample, Fault, StageError
 
 FloatArray = NDArray[np.float64]
 
+_NEAR_ZERO = 2e-3  # counters that start anew are so near 0, though the platen was pushed [m]
+_ELSEWHERE = 1e-4  # farther from there than noise and a platen that settles [m]
+
 
 class StageLife(abc.ABC):
     """What becomes of the boards of a bridge."""
@@ -43,6 +46,7 @@ class StageLife(abc.ABC):
         self._stopped_since = ''  # why, while a fault was latched
         self.why = ''
         self.flying = False  # current flows
+        self._lifting = False  # to find out that the stop below is the lower one
         try:
             self.driver = driver or make_driver(parameters, realtime)
         except DriverError as error:
@@ -154,26 +158,30 @@ class StageLife(abc.ABC):
         because = ''
         try:
             self._start()
+            self._lifting = True
             lift.fly(self)
         except (StageError, ValueError) as error:
             because = f': {error}'
         finally:
+            lifted, self._lifting = self._lifting, False
             self.deactivate()
-        if not lift.fine:
-            self.encoders.homed = False
-            if self.fault is not None:
-                because = f': {self.fault.reason}'
-            elif lift.silent:
-                names = ', '.join(ENCODER_NAMES[i] for i in lift.silent)
-                because += f'; encoder {names} did not count'
+        if self.fault is not None:
+            because = f': {self.fault.reason}'
         self.fault = self.fault or latched
-        if not lift.fine:
-            raise HomingError(
-                f'lifted by {height * 1e3:.2f} mm, the platen rose {lift.risen * 1e3:.2f} mm and '
-                f'tilted {lift.tilt * 1e3:.2f} mrad{because}. It hangs on its upper stop, '
-                'something holds it, or encoders do not count: put it on the lower one, check '
-                'the plugs; a machine that was never commissioned, commission first'
-            )
+        if lift.fine:
+            return
+        self.encoders.homed = False
+        if not lifted:
+            raise HomingError(f'the platen cannot be lifted{because}')
+        if not because and lift.silent:
+            names = ', '.join(ENCODER_NAMES[i] for i in lift.silent)
+            because = f'; encoder {names} did not count'
+        raise HomingError(
+            f'lifted by {height * 1e3:.2f} mm, the platen rose {lift.risen * 1e3:.2f} mm and '
+            f'tilted {lift.tilt * 1e3:.2f} mrad{because}. It hangs on its upper stop, '
+            'something holds it, or encoders do not count: put it on the lower one, check '
+            'the plugs; a machine that was never commissioned, commission first'
+        )
 
     def _peek(self, counts: NDArray[np.int32]) -> None:
         try:
@@ -215,7 +223,7 @@ class StageLife(abc.ABC):
             self._cool()
         if self.driver.stop_pressed:
             return 'the emergency stop is pressed'
-        beyond = self.encoders.beyond_stops()
+        beyond = self.encoders.homed and self.encoders.beyond_stops()
         if beyond:
             return f'{beyond}: home first (~/home)'
         hot, limit = self.amplifiers.load, self.parameters.amplifier.derate_load
@@ -259,15 +267,21 @@ class StageLife(abc.ABC):
             self._lose_boards(error)
 
     def _lose_boards(self, error: DriverError) -> StageError:
-        """Give the boards up, then say so: the fault is latched, the error to be raised."""
-        replaces, flying = self.fault is None or self.mode is Mode.LANDING, self.flying
+        """Give the boards up, then say so: the fault is latched, the error to be raised.
+
+        What was latched before is said too.
+        """
+        before, landing, flying = self.fault, self.mode is Mode.LANDING, self.flying
         self.driver.close()
         self._rest(Mode.LOST)
-        if replaces:
-            kind = 'watchdog' if isinstance(error, WatchdogError) else 'board'
-            what = faults.consequence_of_cut(self.parameters, self.guard) if flying else ''
-            self.fault = Fault(kind, f'{error}{what}', 'see to the boards', True)
-            self.why = kind
+        kind = 'watchdog' if isinstance(error, WatchdogError) else 'board'
+        what = faults.consequence_of_cut(self.parameters, self.guard) if flying else ''
+        fault = Fault(kind, f'{error}{what}', 'see to the boards', True)
+        if before is None:
+            self.fault, self.why = fault, kind
+        elif str(error) not in before.reason:
+            self.fault = faults.then(before, fault)
+            self.why = kind if landing else self.why
         return StageError(str(error))
 
     # -- coming back -------------------------------------------------------------------------------
@@ -344,8 +358,16 @@ class StageLife(abc.ABC):
         return wrong
 
     def _forget_home_of_lost_counts(self, before: NDArray[np.int64]) -> None:
-        """Counters of a board that all came back as 0, and were not, have lost where they were."""
+        """Counters of a board that came back near 0, and were elsewhere, have lost where they were.
+
+        Near it, for somebody may have moved the platen since the board had power again.
+        """
+        after = self._counts.astype(np.int64)
+        resolution = np.array(self.parameters.encoder.resolution)
+        near = np.abs(after) * resolution < _NEAR_ZERO
+        moved = np.abs(after - before) * resolution > _ELSEWHERE
+        moved |= (after == 0) & (before != 0)
         for board in set(self.parameters.encoder.board):
             its = np.array(self.parameters.encoder.board) == board
-            if before[its].any() and not self._counts[its].any():
+            if near[its].all() and moved[its].any():
                 self.encoders.homed = False

@@ -93,6 +93,7 @@ class BridgeNode(StageNode[BridgeNodeParameters, BridgeStage]):
             self.get_logger().error(f'{when}: {self.stage.fault}')
 
     def _home(self) -> tuple[bool, str]:
+        self.take_realtime_priority()  # it may lift the platen
         try:
             shift = self.stage.home()
         except (HomingError, StageError) as error:

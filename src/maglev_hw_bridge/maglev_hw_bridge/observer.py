@@ -81,6 +81,13 @@ def observer_fields(parameters: BridgeParameters) -> dict[str, Any]:
 
 
 @borrowing
+def _foretell(o: ObserverArrays) -> None:
+    """What the encoders should read where the platen is."""
+    gaps_from_outputs(machine_from_array(o.machine), o.position, o.length[:4])
+    o.length[4], o.length[5] = o.position[X], o.position[Z]
+
+
+@borrowing
 def start(o: ObserverArrays, length: FloatArray) -> None:
     """Begin at rest where the encoders (6,) [m] say."""
     machine = machine_from_array(o.machine)
@@ -89,13 +96,7 @@ def start(o: ObserverArrays, length: FloatArray) -> None:
         o.rate[axis] = o.disturbance[axis] = 0.0
         o.model_rate[axis] = o.least_rate[axis] = 0.0
         o.disturbance_then[axis] = o.still_time[axis] = 0.0
-
-
-@borrowing
-def _foretell(o: ObserverArrays) -> None:
-    """What the encoders should read where the platen is."""
-    gaps_from_outputs(machine_from_array(o.machine), o.position, o.length[:4])
-    o.length[4], o.length[5] = o.position[X], o.position[Z]
+    _foretell(o)
 
 
 @compiled

@@ -19,6 +19,7 @@ from maglev_hw_bridge.landing import Landing, impacts_of_cut
 from maglev_hw_bridge.life_cycle import StageLife
 from maglev_hw_bridge.mode import Mode as Mode
 from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_model.axes import AXES
 from maglev_model.stage import EncoderSample, Fault, StageError, Truth, motor_currents
 
 FloatArray = NDArray[np.float64]
@@ -307,13 +308,10 @@ class BridgeStage(StageLife):
             self._disable()
             if flying:
                 reason += faults.consequence_of_cut(self.parameters, self.guard)
-            if self.fault is not None:
-                kind = 'encoder' if self.fault.kind == 'encoder' else kind  # which may be homed
-                reason = f'{self.fault.reason}; then {reason}'
-                remedy = f'{self.fault.remedy}; {remedy}'
-        self.fault = Fault(kind, reason, remedy, cut)
+        fault = Fault(kind, reason, remedy, cut)
+        self.fault = fault if self.fault is None else faults.then(self.fault, fault)
         self._named.clear()
-        self.why = kind
+        self.why = self.fault.kind
         if self.mode is Mode.FOLLOWING:
             self._begin_landing()
 
@@ -337,6 +335,8 @@ class BridgeStage(StageLife):
         if code in (guard.RANGE, guard.GAP_RANGE):
             if self.mode is Mode.LANDING:  # is on its way out of there
                 return
+            if self._lifting and code == guard.RANGE and AXES[index] in ('x', 'z'):
+                return  # it stands at its home, which may be at the stops
             self._raise_fault('range', *faults.range_fault(code, index, self.guard))
         elif code == guard.MOTORS:
             why = faults.motor_fault(index, self.guard)
