@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from runner.common_options import OUTPUT, Job, out_folder, out_option, talk
-from runner.graph import VIEWS, Flight, Scenario
+from runner.graph import VIEWS, Flight, Scenario, text_value
 from runner.options import (
     Command,
     HelpAskedError,
@@ -122,8 +122,8 @@ def _trajectory(options: Sequence[str]) -> Job:
     if chosen.endswith('.csv'):
         if not Path(chosen).is_file() or not os.access(chosen, os.R_OK):
             raise WrongUseError(f"cannot read '{chosen}'")
-        quoted = str(Path(chosen).resolve()).replace("'", "''")
-        scenario = Scenario('file', ('scenario_file.yaml',), (f"file.path:='{quoted}'",))
+        path = text_value('file.path', str(Path(chosen).resolve()))
+        scenario = Scenario('file', ('scenario_file.yaml',), (path,))
     else:
         name = one_of(*names)('the trajectory', chosen)
         offer = f'matched_{name}.yaml' if (PARAMS / f'matched_{name}.yaml').is_file() else ''

@@ -20,6 +20,12 @@ _WATCHERS = ('monitor', 'recorder')
 _PACKAGES = {'watchers': 'maglev_monitor', 'web': 'maglev_view'}
 
 
+def text_value(name: str, text: str) -> str:
+    """A parameter of any text for ``-p``, whose values are read as YAML."""
+    quoted = text.replace("'", "''")
+    return f"{name}:='{quoted}'"
+
+
 class Scenario(NamedTuple):
     """What is flown: parameter files of params/ over the nodes' own, arguments of the reference.
 
@@ -70,7 +76,7 @@ class Flight(NamedTuple):
             if Path(file).is_file():
                 arguments += ['--params-file', file]
         for each in nodes:
-            own = f'effective_parameters:={self.out}/params/{each}.yaml'
+            own = text_value('effective_parameters', f'{self.out}/params/{each}.yaml')
             for value in (own, *self._values(each)):
                 arguments += ['-p', f'{each}:{value}' if len(nodes) > 1 else value]
         return arguments
@@ -80,13 +86,13 @@ class Flight(NamedTuple):
 
     def _values(self, node: str) -> list[str]:
         if node == 'recorder':
-            asked = shlex.join([f'{sys.argv[1]}.sh', *sys.argv[2:]]).replace("'", "''")
-            return [f'output:={self.out}/bag', f"command:='{asked}'"]
+            asked = shlex.join([f'{sys.argv[1]}.sh', *sys.argv[2:]])
+            return [text_value('output', f'{self.out}/bag'), text_value('command', asked)]
         if node in VIEWS:
             return []
         mode = f'mode:={self.mode}'
         if node == 'monitor':
-            output = f'output:={self.out}/metrics.json'
+            output = text_value('output', f'{self.out}/metrics.json')
             scenario = f'scenario:={self.scenario.name}'
             return ['exit_at_end:=false', output, scenario, f'stage:={self.stage}', mode]
         values = [mode, f'watchers:=[{",".join(map(repr, _WATCHERS))}]']

@@ -5,8 +5,10 @@ from __future__ import annotations
 import pytest
 from stand_ins import NODES, ROOT, Tree
 
+from maglev_model.parameters import read_argument
 from runner import overlays
 
+WATCHING = ('monitor', 'recorder')
 WATCHERS = "watchers:=['monitor','recorder']"
 
 
@@ -22,16 +24,30 @@ def test_the_nodes_get_their_parameters(tree: Tree) -> None:
         assert tree.files(node)[0] == 'params/machine.yaml'
         assert tree.files(node)[-3:] == over
         if node != 'watchers':
-            assert f'effective_parameters:={tree.out}/params/{node}.yaml' in tree.arguments(node)
+            assert f"effective_parameters:='{tree.out}/params/{node}.yaml'" in tree.arguments(node)
     assert {'mode:=realtime', WATCHERS} <= set(tree.arguments('plant'))
     reference = tree.arguments('reference')
     assert {'duration:=3.0', 'autostart:=true', WATCHERS, 'lead:=128'} <= set(reference)
     watchers = tree.arguments('watchers')
     assert {
-        *(f'monitor:output:={tree.out}/metrics.json', f'recorder:output:={tree.out}/bag'),
+        *(f"monitor:output:='{tree.out}/metrics.json'", f"recorder:output:='{tree.out}/bag'"),
         *('monitor:scenario:=ellipse', 'monitor:stage:=plant', 'monitor:mode:=realtime'),
-        *(f'{w}:effective_parameters:={tree.out}/params/{w}.yaml' for w in ('monitor', 'recorder')),
+        *(f"{w}:effective_parameters:='{tree.out}/params/{w}.yaml'" for w in WATCHING),
     } <= set(watchers)
+
+
+@pytest.mark.parametrize('name', ['run #2', 'run: 2', "o'neil", '[2', '2026', '~'])
+def test_the_nodes_read_the_folder_as_it_is_named(tree: Tree, name: str) -> None:
+    tree.out = tree.path / name
+    code, output = tree.run()
+    assert code == 0, output
+    for node in WATCHING:
+        heard: dict[str, object] = {}
+        for word in tree.arguments('watchers'):
+            heard.update(read_argument(word, node) if ':=' in word else {})
+        own = 'bag' if node == 'recorder' else 'metrics.json'
+        assert heard['output'] == str(tree.out / own)
+        assert heard['effective_parameters'] == str(tree.out / 'params' / f'{node}.yaml')
 
 
 def test_without_a_machine_file_each_node_starts_with_its_own(tree: Tree) -> None:
