@@ -18,6 +18,7 @@ from maglev_controller.parameters import ControllerParameters
 from maglev_model.axes import AXES
 from maglev_model.optional import MissingLibraryError
 from maglev_model.parameters import ParameterError, from_yaml
+from maglev_model.progress import Progress
 from maglev_plant.parameters import PlantParameters
 from maglev_study.robustness import fleet, guarantee
 from maglev_study.robustness.draw import NOMINAL
@@ -37,6 +38,12 @@ EXPERIMENTS = ('ellipse', 'step_theta')
 def plan() -> Plan:
     """The nominal machine and two drawn ones, under the default law, through little."""
     return make_plan(PARAMS, 2, names=EXPERIMENTS)
+
+
+def call_of(out: Path) -> list[str]:
+    """The command's arguments for that plan."""
+    call = ['--params', str(PARAMS), '--machines', '2', '--jobs', '1', '--out', str(out)]
+    return [*call, '--experiment', *EXPERIMENTS]
 
 
 @pytest.fixture(scope='module')
@@ -206,8 +213,7 @@ def test_the_page_and_the_command(
     monkeypatch.setattr(guarantee, 'GAPS', (0.02, 0.025))
     monkeypatch.setattr(guarantee, 'SETS', 2)
     shutil.copy(whole[1] / JOURNAL, tmp_path)
-    call = ['--params', str(PARAMS), '--machines', '2', '--jobs', '1', '--out', str(tmp_path)]
-    assert main([*call, '--json', '--experiment', *EXPERIMENTS]) == DONE
+    assert main([*call_of(tmp_path), '--json']) == DONE
     captured = capsys.readouterr()
     assert 'robustness: 3 of 3 flown' in captured.err
     outcome = json.loads(captured.out)
@@ -230,6 +236,30 @@ def test_the_page_and_the_command(
         'remanence within a grade',
     ):
         assert words in page
+
+
+def test_margins_are_those_within_the_stops(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(guarantee, 'GAPS', (0.02, 0.025))
+    monkeypatch.setattr(guarantee, 'SETS', 2)
+    over = tmp_path / 'over.yaml'
+    over.write_text('/**: {ros__parameters: {machine: {gap_min: 0.021, theta_max: 0.005}}}\n')
+    (found,) = guarantee.guarantees(make_plan(PARAMS, 1, overlays=[over]))
+    assert {(one.place.gap, one.place.tilt) for one in found.over} == {(0.025, 0.0)}
+
+
+def test_without_margins_there_is_a_page_that_says_why(
+    whole: tuple[Campaign, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    monkeypatch.setattr(guarantee, 'GAPS', ())
+    monkeypatch.setattr(guarantee, 'HOVERING', guarantee.Place(0.05, 0.0, 0.1, 0))
+    shutil.copy(whole[1] / JOURNAL, tmp_path)
+    assert main(call_of(tmp_path)) == DONE
+    page = (tmp_path / 'robustness.html').read_text(encoding='utf-8')
+    for said in (capsys.readouterr().out, page):
+        assert 'puts y at 0.05 m, it must lie within the stops' in said
+    assert '2 of 2' in page
 
 
 def test_the_table_holds_every_figure(
@@ -295,6 +325,21 @@ def test_a_scheduler_without_dask_is_told_what_to_install(
     monkeypatch.setitem(sys.modules, 'distributed', None)
     with pytest.raises(MissingLibraryError, match='--scheduler needs distributed: pip install'):
         fly_plan(plan, tmp_path, scheduler='tcp://localhost:1')
+
+
+def test_ctrl_c_among_the_margins_keeps_what_was_flown(
+    whole: tuple[Campaign, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(progress: Progress, *_: object) -> None:
+        if progress._what == 'margins':
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(Progress, 'tell', interrupted)
+    shutil.copy(whole[1] / JOURNAL, tmp_path)
+    assert main(call_of(tmp_path)) == INTERRUPTED
+    page = (tmp_path / 'robustness.html').read_text(encoding='utf-8')
+    assert 'incomplete' in page
+    assert '2 of 2' in page
 
 
 def test_ctrl_c_leaves_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -21,10 +21,10 @@ from maglev_study.robustness.fleet import Plan
 from maglev_study.robustness.workers import results
 
 GAPS = (0.020, 0.0225, 0.025, 0.0275, 0.030)
-"""Air gaps looked at [m]."""
+"""Air gaps looked at [m], those within the machine's stops."""
 
 TILTS, SPEEDS, DELAYS = (0.0, 0.010), (0.0, 0.1), (0, 1)
-"""Tilts theta [rad], speeds of all axes [m/s, rad/s], and what the currents come late [samples]."""
+"""Tilts theta [rad], likewise; speeds of each axis [m/s, rad/s]; delays of currents [samples]."""
 
 MOST_MACHINES = 30
 """Drawn machines whose margins are computed, the first ones."""
@@ -109,7 +109,8 @@ def guarantees(
 ) -> list[Guarantees]:
     """For each law of a campaign that has a linear model.
 
-    ``heard`` is told how many loops of how many are looked at. Raises what
+    ``heard`` is told how many loops of how many are looked at. Raises ParameterError where a
+    machine has no such loop, as one that cannot hover at :data:`HOVERING`, and what
     :func:`~maglev_study.robustness.workers.results` raises.
     """
     laws = [one for one in plan.contestants if control_law(one.controller).make is None]
@@ -123,7 +124,10 @@ def guarantees(
 
 
 def _tasks(part: Plan) -> Iterator[tuple[Plan, int, Place]]:
-    for place in itertools.product(GAPS, TILTS, SPEEDS, DELAYS):
+    machine = part.contestants[0].plant.machine
+    gaps = [gap for gap in GAPS if machine.gap_min <= gap <= machine.gap_max]
+    tilts = [tilt for tilt in TILTS if tilt <= machine.theta_max]
+    for place in itertools.product(gaps, tilts, SPEEDS, DELAYS):
         yield part, NOMINAL, Place(*place)
     for number in range(1, min(part.machines, MOST_MACHINES) + 1):
         yield part, number, HOVERING

@@ -7,6 +7,7 @@ machine, with which the whole graph flies it.
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import json
 import os
 import sys
@@ -21,6 +22,7 @@ from maglev_model.progress import Progress, add_output_options, talking
 if TYPE_CHECKING:
     from maglev_study.robustness.fleet import Campaign, Plan
     from maglev_study.robustness.fly import Flown
+    from maglev_study.robustness.guarantee import Guarantees
 
 DONE, WRONG_USE, INTERRUPTED = 0, 2, 130
 
@@ -85,7 +87,8 @@ def _fly(plan: Plan, options: argparse.Namespace) -> tuple[int, dict[str, Any]]:
     for experiment, *cells in table:
         for law, cell in zip(laws, cells, strict=True):
             print(f'  {experiment:12}{law:20}{cell}')
-    files = _leave(campaign, options)
+    campaign, guaranteed, unknown = _margins(campaign, options)
+    files = _leave(campaign, options, guaranteed, unknown)
     for path in files:
         print(f'  {path}')
     outcome = {
@@ -98,10 +101,37 @@ def _fly(plan: Plan, options: argparse.Namespace) -> tuple[int, dict[str, Any]]:
     return DONE, outcome
 
 
-def _leave(campaign: Campaign, options: argparse.Namespace) -> list[Path]:
+def _margins(
+    campaign: Campaign, options: argparse.Namespace
+) -> tuple[Campaign, Sequence[Guarantees], str]:
+    """What the laws are guaranteed, or why that is not known; Ctrl-C interrupts the campaign."""
+    from maglev_study.robustness.guarantee import guarantees
+
+    if campaign.interrupted:
+        return campaign, (), ''
+    progress = Progress('robustness', 'margins')
+    try:
+        found = guarantees(
+            campaign.plan, jobs=options.jobs, scheduler=options.scheduler, heard=progress.tell
+        )
+    except ParameterError as error:
+        print(f'robustness: no margins: {error}')
+        return campaign, (), str(error)
+    except KeyboardInterrupt:
+        return dataclasses.replace(campaign, interrupted=True), (), ''
+    finally:
+        progress.end()
+    return campaign, found, ''
+
+
+def _leave(
+    campaign: Campaign,
+    options: argparse.Namespace,
+    guaranteed: Sequence[Guarantees],
+    unknown: str,
+) -> list[Path]:
     """Write table and page; their paths."""
     from maglev_monitor.report.page import write_page
-    from maglev_study.robustness.guarantee import guarantees
     from maglev_study.robustness.page import render
     from maglev_study.robustness.table import write_table
 
@@ -115,14 +145,8 @@ def _leave(campaign: Campaign, options: argparse.Namespace) -> list[Path]:
     table, note = write_table(campaign, options.out)
     if note:
         print(f'robustness: csv in place of parquet: {note}')
-    path, guaranteed = options.out / 'robustness.html', []
-    if not campaign.interrupted:
-        progress = Progress('robustness', 'margins')
-        guaranteed = guarantees(
-            plan, jobs=options.jobs, scheduler=options.scheduler, heard=progress.tell
-        )
-        progress.end()
-    write_page(path, render(campaign, words, ' '.join(call), guaranteed))
+    path = options.out / 'robustness.html'
+    write_page(path, render(campaign, words, ' '.join(call), guaranteed, unknown))
     return [path, table]
 
 

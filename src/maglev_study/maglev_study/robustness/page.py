@@ -35,9 +35,16 @@ NOTES = (
 
 
 def render(
-    campaign: Campaign, words: Sequence[str], replay: str, guaranteed: Sequence[Guarantees] = ()
+    campaign: Campaign,
+    words: Sequence[str],
+    replay: str,
+    guaranteed: Sequence[Guarantees] = (),
+    unknown: str = '',
 ) -> str:
-    """The page as HTML; ``replay`` is the command that flies a machine, but for its number."""
+    """The page as HTML; ``replay`` is the command that flies a machine, but for its number.
+
+    ``unknown`` is why there are no guarantees.
+    """
     from maglev_monitor.report.chart import render as drawn_charts
     from maglev_monitor.report.page import bullets, header, html_table, page
 
@@ -60,7 +67,7 @@ def render(
             _worst_rows(found, laws, replay),
         ),
         bullets('Lost', _lost(found)),
-        *_margins(guaranteed, found),
+        *_margins(guaranteed, unknown, found),
         '<h2>Figures</h2>',
         html_table(
             ['law', 'experiment', 'figure', 'nominal', *_shares(), 'worst', 'the paper'],
@@ -75,13 +82,16 @@ def render(
     return page('Robustness', parts)
 
 
-def _margins(guaranteed: Sequence[Guarantees], found: Sequence[Group]) -> list[str]:
+def _margins(guaranteed: Sequence[Guarantees], unknown: str, found: Sequence[Group]) -> list[str]:
     from maglev_monitor.report.page import bullets, html_table
 
+    head = '<h2>Guaranteed margins</h2>'
+    if unknown:
+        return [head, bullets('Not known', [unknown])]
     if not guaranteed:
         return []
     return [
-        '<h2>Guaranteed margins</h2>',
+        head,
         html_table(margins_page.HEADS, margins_page.rows(guaranteed)),
         bullets('Beside the flights', margins_page.words(guaranteed, found)),
         bullets('What it says', margins_page.NOTES),
