@@ -62,6 +62,13 @@ def test_what_is_refused_is_named(name: str, value: object, said: str) -> None:
         parameters.build(Table, {name: value})
 
 
+@pytest.mark.parametrize('name', ['magnet.height', 'pairs', 'on', 'gains', 'names'])
+def test_a_whole_number_that_no_double_holds(name: str) -> None:
+    value = -(10**400)
+    with pytest.raises(ParameterError, match=rf"'{name}.*' is a whole number that no double"):
+        parameters.build(Table, {name: [value] if name in ('gains', 'names') else value})
+
+
 def test_a_required_parameter_must_be_given() -> None:
     @dataclass(frozen=True, kw_only=True)
     class Required:
@@ -169,7 +176,15 @@ def test_arguments_are_for_all_nodes_or_one() -> None:
 
 
 @pytest.mark.parametrize(
-    'text', ['pairs: 3', '- 1', 'plant: {pairs: 3}', 'plant: {ros__parameters: [']
+    'text',
+    [
+        *('pairs: 3', '- 1', 'plant: {pairs: 3}', 'plant: {ros__parameters: ['),
+        *(f'plant: {{ros__parameters: {{{{{key}}}}}}}' for key in ('x', 'x: 1')),
+        *(f'plant: {{ros__parameters: {value}}}' for value in ('5', '0', '[1]', '[]', 'text')),
+        f'plant: {{ros__parameters: {{pairs: {10**4000}{10**4000}}}}}',
+        'plant: {ros__parameters: {magnet.height: 0.01, magnet: {height: 0.02}}}',
+        'plant: {ros__parameters: {pairs: 2}}\n/plant: {ros__parameters: {pairs: 4}}',
+    ],
 )
 def test_files_that_are_no_parameter_files(tmp_path: Path, text: str) -> None:
     path = tmp_path / 'bad.yaml'

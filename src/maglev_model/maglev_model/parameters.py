@@ -13,12 +13,15 @@ import difflib
 import functools
 import math
 import re
+import sys
 import typing
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
 import yaml
+
+from maglev_model import ros_yaml
 
 T = TypeVar('T')
 
@@ -29,12 +32,6 @@ A node that has no such group leaves it to the others; one that has it refuses w
 """
 
 _METADATA_KEY = 'maglev_parameter'
-_NUMBERS = {
-    'int': r'^[-+]?(0x[0-9a-fA-F]+|0[0-7]*|[1-9]\d*)$',
-    'float': r'^[-+]?(\d+\.\d*|\.\d+|\d+(?=[eE]))([eE][-+]?\d+)?$|^[-+]?\.(inf|Inf|INF)$'
-    r'|^\.(nan|NaN|NAN)$',
-}
-"""What a parameter file writes for a number, by YAML's name of the type."""
 _SCALARS: dict[type, str] = {bool: 'bool', int: 'integer', float: 'double', str: 'string'}
 
 
@@ -115,6 +112,8 @@ class Spec:
     def _check_element(self, value: object, where: str) -> Any:
         if hasattr(value, 'item') and not isinstance(value, str | bytes):  # a NumPy scalar
             value = value.item()
+        if isinstance(value, int) and abs(value) > sys.float_info.max:
+            raise ParameterError(f"parameter '{where}' is a whole number that no double holds")
         if self.kind is float and isinstance(value, int) and not isinstance(value, bool):
             value = float(value)
         if type(value) is not self.kind:
@@ -274,7 +273,7 @@ def read_yaml(path: str | Path, *nodes: str) -> dict[str, object]:
     :class:`ParameterError` when the file is missing or is no parameter file.
     """
     try:
-        content = yaml.load(Path(path).read_text(encoding='utf-8'), Loader=_Loader) or {}
+        content = ros_yaml.load(Path(path).read_text(encoding='utf-8')) or {}
     except (OSError, UnicodeDecodeError) as error:
         raise ParameterError(f"cannot read parameter file '{path}': {error}") from error
     except yaml.YAMLError as error:
@@ -282,13 +281,21 @@ def read_yaml(path: str | Path, *nodes: str) -> dict[str, object]:
     if not isinstance(content, dict):
         raise ParameterError(f"'{path}' is no ROS parameter file: it must map nodes to parameters")
     found: dict[str, object] = {}
+    seen: set[str] = set()
     for section, body in content.items():
         if not isinstance(body, dict) or set(body) != {'ros__parameters'}:
             raise ParameterError(
                 f"'{path}': section '{section}' must hold 'ros__parameters' and nothing else"
             )
-        if _applies(str(section), nodes):
-            found.update(_flatten(body['ros__parameters'] or {}))
+        if (name := _absolute(str(section))) in seen:
+            raise ParameterError(f"'{path}': section '{name}' is there twice")
+        seen.add(name)
+        try:
+            own = _flatten(body['ros__parameters'])
+        except ValueError as error:
+            raise ParameterError(f"'{path}': in section '{section}' {error}") from error
+        if _applies(name, nodes):
+            found.update(own)
     return found
 
 
@@ -302,16 +309,20 @@ def read_argument(text: str, *nodes: str) -> dict[str, object]:
     if section and not _applies(section, nodes):
         return {}
     try:
-        return {name: yaml.load(value, Loader=_Loader)}
+        return {name: ros_yaml.load(value)}
     except yaml.YAMLError as error:
         raise ParameterError(f"'{value}' of parameter '{name}' is no valid YAML") from error
 
 
 def _applies(section: str, nodes: Iterable[str]) -> bool:
     """Whether a section of a parameter file is for a node that has these names."""
-    pattern = re.escape('/' + section.lstrip('/'))
+    pattern = re.escape(_absolute(section))
     pattern = pattern.replace(r'/\*\*', '(/[^/]+)*').replace(r'\*', '[^/]+')
-    return any(re.fullmatch(pattern, '/' + node.lstrip('/')) for node in nodes)
+    return any(re.fullmatch(pattern, _absolute(node)) for node in nodes)
+
+
+def _absolute(name: str) -> str:
+    return '/' + name.lstrip('/')
 
 
 def from_yaml(cls: type[T], node: str, *paths: str | Path) -> T:
@@ -353,50 +364,24 @@ def to_yaml(instance: Any, node: str) -> str:
         f'{DIFFERS}{name}: {value!r} (by default {default!r})\n'
         for name, (value, default) in differing(instance).items()
     ]
-    text = yaml.dump(content, Dumper=_Dumper, sort_keys=False, default_flow_style=None)
-    return ''.join(lines) + str(text)
+    return ''.join(lines) + ros_yaml.dump(content)
 
 
-class _Loader(yaml.SafeLoader):
-    """Takes values as ROS does: 1e-3 is a number, 2026-01-31 and 12:30 are texts.
-
-    Refuses a mapping that names a key twice, of which YAML would silently take the last.
-    """
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        """Raises yaml.YAMLError with the key and its line."""
-        seen: set[Any] = set()
-        for key_node, _ in node.value:
-            key = self.construct_object(key_node, deep=True)  # type: ignore[no-untyped-call]
-            if key in seen:
-                raise yaml.YAMLError(
-                    f"'{key}' is given twice, again in line {key_node.start_mark.line + 1}"
-                )
-            seen.add(key)
-        return super().construct_mapping(node, deep)
-
-
-class _Dumper(yaml.SafeDumper):
-    """Quotes the strings that ROS, unlike PyYAML, takes for booleans or numbers: y, n and 1e3."""
-
-
-_Dumper.add_implicit_resolver('tag:yaml.org,2002:bool', re.compile('^[yYnN]$'), list('yYnN'))
-_Loader.yaml_implicit_resolvers = {
-    first: [each for each in resolvers if each[0].split(':')[-1] not in ('timestamp', *_NUMBERS)]
-    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
-}
-for _kind, _pattern in _NUMBERS.items():
-    for _each in (_Loader, _Dumper):
-        _each.add_implicit_resolver(
-            f'tag:yaml.org,2002:{_kind}', re.compile(_pattern), list('-+.0123456789')
-        )
-
-
-def _flatten(mapping: Mapping[str, Any], prefix: str = '') -> dict[str, object]:
+def _flatten(parameters: object) -> dict[str, object]:
+    """Values by full name; raises ValueError for what is none, and for a name with two values."""
+    if not isinstance(parameters, dict | None):
+        raise ValueError(f"'ros__parameters' is {parameters!r}, it must map names to values")
     found: dict[str, object] = {}
+    for name, value in _values_in(parameters or {}, ''):
+        if name in found:
+            raise ValueError(f"'{name}' is given twice")
+        found[name] = value
+    return found
+
+
+def _values_in(mapping: Mapping[Any, Any], prefix: str) -> Iterator[tuple[str, object]]:
     for key, value in mapping.items():
         if isinstance(value, dict):
-            found.update(_flatten(value, f'{prefix}{key}.'))
+            yield from _values_in(value, f'{prefix}{key}.')
         else:
-            found[f'{prefix}{key}'] = value
-    return found
+            yield f'{prefix}{key}', value

@@ -1,0 +1,60 @@
+"""YAML with scalars as ROS takes them: 1e-3 is a number, 2026-01-31 and 12:30 are texts."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Hashable
+from typing import Any
+
+import yaml
+
+_NUMBERS = {
+    'int': r'^[-+]?(0x[0-9a-fA-F]+|0[0-7]*|[1-9]\d*)$',
+    'float': r'^[-+]?(\d+\.\d*|\.\d+|\d+(?=[eE]))([eE][-+]?\d+)?$|^[-+]?\.(inf|Inf|INF)$'
+    r'|^\.(nan|NaN|NAN)$',
+}
+"""What is written for a number, by YAML's name of the type."""
+
+
+def load(text: str) -> Any:
+    """What a text says; raises yaml.YAMLError, also for a mapping that names a key twice."""
+    try:
+        return yaml.load(text, Loader=_Loader)
+    except ValueError as error:  # of a number that Python does not make
+        raise yaml.YAMLError(str(error)) from error
+
+
+def dump(content: object) -> str:
+    """The text that ROS and :func:`load` read as ``content``."""
+    return str(yaml.dump(content, Dumper=_Dumper, sort_keys=False, default_flow_style=None))
+
+
+class _Loader(yaml.SafeLoader):
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        """Raises yaml.YAMLError with the key that is none, or is given twice, and its line."""
+        seen: set[Any] = set()
+        for key_node, _ in node.value:
+            key = self.construct_object(key_node, deep=True)  # type: ignore[no-untyped-call]
+            line = key_node.start_mark.line + 1
+            if not isinstance(key, Hashable):
+                raise yaml.YAMLError(f'{key} in line {line} is no name')
+            if key in seen:
+                raise yaml.YAMLError(f"'{key}' is given twice, again in line {line}")
+            seen.add(key)
+        return super().construct_mapping(node, deep)
+
+
+class _Dumper(yaml.SafeDumper):
+    """Quotes the strings that ROS, unlike PyYAML, takes for booleans or numbers: y, n and 1e3."""
+
+
+_Dumper.add_implicit_resolver('tag:yaml.org,2002:bool', re.compile('^[yYnN]$'), list('yYnN'))
+_Loader.yaml_implicit_resolvers = {
+    first: [each for each in resolvers if each[0].split(':')[-1] not in ('timestamp', *_NUMBERS)]
+    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
+for _kind, _pattern in _NUMBERS.items():
+    for _each in (_Loader, _Dumper):
+        _each.add_implicit_resolver(
+            f'tag:yaml.org,2002:{_kind}', re.compile(_pattern), list('-+.0123456789')
+        )
