@@ -25,6 +25,7 @@ from maglev_model.parameters import build
 
 DEFAULT = BridgeParameters()
 PEAK = 1.5
+LINES = {'boards.stop_input': 0, 'boards.enable_output': 1}
 OTHER_MACHINE = {
     'emulation.guide.coulomb': [0.4, 0.22, 0.12, 1.6, 1.1],
     'emulation.offset.K_h': 0.95,
@@ -43,13 +44,24 @@ def exchanged(values: Sequence[int], one: int, two: int) -> list[int]:
     return result
 
 
-def commission(claimed: dict[str, object]) -> tuple[list[str], EmulatedBoards]:
-    """Commission a machine that is wired as by default, with what the parameters claim."""
+def commission(
+    claimed: dict[str, object], asked: Callable[[EmulatedBoards, str], None] | None = None
+) -> tuple[list[str], EmulatedBoards]:
+    """Commission a machine that is wired as by default, with what the parameters claim.
+
+    ``asked`` is called with each question.
+    """
     parameters = build(BridgeParameters, {**HOME, **claimed})
     boards = EmulatedBoards(build(BridgeParameters, {**HOME, **claimed, **OTHER_MACHINE}))
     told: list[str] = []
     driver = QuanserDriver(parameters, boards, boards.now, boards.sleep)
-    operator = EmulatedPerson(boards, told.append)
+
+    def go_on(step: str) -> None:
+        told.append(step)
+        if asked is not None:
+            asked(boards, step)
+
+    operator = EmulatedPerson(boards, go_on)
     steps = Commissioning(parameters, driver, peak=PEAK, operator=operator, tell=told.append)
     try:
         steps.run()
@@ -66,6 +78,29 @@ def test_a_machine_that_is_right() -> None:
     assert any(f'rose 0.{height}' in told[-1] for height in (49, 50, 51))
     assert boards.rig.state[0] == 0.031
     assert boards.rig.impact < 0.05
+
+
+@pytest.mark.parametrize('presses_at', [0.0, 1.0])
+def test_an_emergency_stop_ends_the_pulses(presses_at: float) -> None:
+    """Pressed while it asks, and while so much current flows [A]."""
+    flowed: list[float] = []
+
+    def asked(boards: EmulatedBoards, step: str) -> None:
+        if not step.startswith('motor 1'):
+            return
+        tick = boards.tick
+
+        def pressing() -> None:
+            tick()
+            flowed.append(float(np.max(np.abs(boards.rig.phase_current))))
+            boards.stop_pressed |= flowed[-1] >= presses_at
+
+        boards.tick = pressing  # type: ignore[method-assign]
+        boards.stop_pressed = presses_at == 0.0
+
+    with pytest.raises(WrongError, match='the emergency stop is pressed'):
+        commission(LINES, asked)
+    assert max(flowed, default=0.0) <= 1.1 * presses_at
 
 
 @pytest.mark.parametrize('phase', [pytest.param(0, marks=pytest.mark.long), 8])
@@ -174,9 +209,6 @@ def test_it_asks_and_takes_no_for_an_answer(
     monkeypatch.setattr('builtins.input', answer)
     assert run(['--params', str(PARAMS)]) == 130
     assert 'stopped' in capsys.readouterr().err
-
-
-LINES = {'boards.stop_input': 0, 'boards.enable_output': 1}
 
 
 def prove(claimed: dict[str, object], spoil: Callable[[EmulatedBoards], None]) -> list[str]:

@@ -141,6 +141,7 @@ class Commissioning:
             if phase % 3 == 0:
                 self._ask(f'motor {phase // 3 + 1}: up to {self._peak:g} A in each phase alone')
             foretold.append(twins.phase(phase, pulses.place))
+            self._driver.counts(self._counts)  # and looks at the emergency stop
             seen.append(pulses.phase(phase))
             self._tell(f'  {PHASE_NAMES[phase]}: {_in_words(seen[-1])}')
         finding = diagnose(np.array(seen), np.stack(foretold, axis=1))

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from maglev_hw_bridge.amplifiers import Amplifiers
-from maglev_hw_bridge.drivers import Driver, WatchdogError
+from maglev_hw_bridge.drivers import Driver, SampledDriver, WatchdogError
 from maglev_hw_bridge.operators import Act, Operator, Sight
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.signal_parameters import PHASES
@@ -23,6 +23,12 @@ _PRESS = 15.0  # time to press the stop [s]
 
 class WrongError(Exception):
     """A step found something wrong; the message says what to change."""
+
+
+def refuse_pressed(driver: SampledDriver) -> None:
+    """Raises WrongError where the emergency stop was pressed when the boards were read last."""
+    if driver.stop_pressed:
+        raise WrongError('the emergency stop is pressed: release it, then begin anew')
 
 
 class Proof:

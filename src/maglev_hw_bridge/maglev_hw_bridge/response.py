@@ -16,6 +16,7 @@ from maglev_hw_bridge.amplifiers import Amplifiers
 from maglev_hw_bridge.drivers import CountArray, SampledDriver, VoltArray
 from maglev_hw_bridge.encoders import Encoders
 from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.proof import refuse_pressed
 from maglev_hw_bridge.rig import Rig
 from maglev_hw_bridge.signal_parameters import PHASES
 from maglev_model.axes import FloatArray
@@ -45,8 +46,9 @@ class Pulses:
     def phase(self, phase: int) -> FloatArray:
         """What the encoders saw of one phase's current, (2, 6) [m]: positive, then negative.
 
-        Raises DriverError.
+        Raises DriverError, and WrongError once the emergency stop is pressed.
         """
+        refuse_pressed(self._driver)
         self._driver.start()
         try:
             self._sample()
@@ -58,6 +60,7 @@ class Pulses:
     def _sample(self) -> FloatArray:
         self._driver.write(self._amplifiers.drive_phases(self._current))
         self._driver.read(self._counts)
+        refuse_pressed(self._driver)
         return self._encoders.decode(self._counts)
 
     def _pulse(self, phase: int, sign: float) -> FloatArray:
@@ -142,6 +145,8 @@ class _Twin:
 
 class _RigDriver:
     """The rig without boards before it: nothing to arm, enable or disable."""
+
+    stop_pressed = False
 
     def __init__(self, rig: Rig) -> None:
         self._rig = rig

@@ -29,6 +29,9 @@ class WatchdogError(DriverError):
 class SampledDriver(Protocol):
     """What goes on sample by sample; every call may raise DriverError."""
 
+    stop_pressed: bool
+    """Whether the emergency stop input was active when the boards were read last."""
+
     def start(self) -> None:
         """Arm the watchdog, start the clock that paces :meth:`read`, enable the amplifiers."""
         ...
@@ -60,9 +63,6 @@ class Driver(SampledDriver, Protocol):
 
     The first board's encoders are to be those of the tick, the other's may be read that much later.
     """
-
-    stop_pressed: bool
-    """Whether the emergency stop input was active at the last :meth:`read` or :meth:`counts`."""
 
     def open(self) -> None:
         """Open and check the boards: no current, amplifiers disabled."""
