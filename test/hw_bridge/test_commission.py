@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from maglev_hw_bridge.drivers.emulated import EmulatedBoards
 from maglev_hw_bridge.drivers.quanser import QuanserDriver
 from maglev_hw_bridge.emulated_card import EmulatedCard
 from maglev_hw_bridge.memory import Memory
-from maglev_hw_bridge.operators import EmulatedPerson
+from maglev_hw_bridge.operators import EmulatedPerson, Person, Sight
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.proof import Proof, WrongError
 from maglev_hw_bridge.response import Twins
@@ -211,16 +212,21 @@ def test_it_asks_and_takes_no_for_an_answer(
     assert 'stopped' in capsys.readouterr().err
 
 
-def prove(claimed: dict[str, object], spoil: Callable[[EmulatedBoards], None]) -> list[str]:
-    """Prove the last line of a machine with both lines."""
+def prove(
+    claimed: dict[str, object],
+    spoil: Callable[[EmulatedBoards], None],
+    driver_type: type[QuanserDriver] = QuanserDriver,
+) -> list[str]:
+    """Prove the last line of a machine with both lines to one who takes a second to answer."""
     parameters = build(BridgeParameters, {**LINES, **claimed})
     boards = EmulatedBoards(parameters)
     spoil(boards)
-    driver = QuanserDriver(parameters, boards, boards.now, boards.sleep)
+    driver = driver_type(parameters, boards, boards.now, boards.sleep)
     told: list[str] = []
     driver.open()
     try:
-        Proof(parameters, driver, EmulatedPerson(boards, told.append), told.append).run()
+        person = EmulatedPerson(boards, told.append, response=1.0)
+        Proof(parameters, driver, person, told.append).run()
     finally:
         driver.close()
         assert not np.any(boards.volts)
@@ -240,6 +246,8 @@ def test_the_last_line_is_proven() -> None:
     told = prove({'boards.stop_input': -1, 'boards.enable_output': -1}, nothing)
     assert 'no emergency stop to prove' in told[0]
     assert 'no enable line to prove' in told[1]
+    told = prove({'boards.enable_output': -1}, nothing)
+    assert told[-1] == '  emergency stop: no current: pass'
 
 
 @pytest.mark.parametrize(
@@ -282,15 +290,60 @@ def test_a_last_line_that_does_not_work(spoil: Callable[[EmulatedBoards], None],
         prove({}, spoil)
 
 
-def test_a_watchdog_that_does_not_expire(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(EmulatedCard, 'on_tick', _without_watchdog)
-    with pytest.raises(WrongError, match='did not expire'):
+@pytest.mark.parametrize('factor', [45, 1e6])
+def test_a_watchdog_that_expires_late_or_never(
+    factor: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By when the operator has looked, the first has expired."""
+    start = EmulatedCard.watchdog_start
+
+    def start_late(card: EmulatedCard, timeout: float) -> None:
+        start(card, factor * timeout)
+
+    monkeypatch.setattr(EmulatedCard, 'watchdog_start', start_late)
+    with pytest.raises(WrongError, match=r'did not expire within 0\.04 s'):
         prove({}, nothing)
 
 
-def _without_watchdog(card: EmulatedCard) -> None:
-    if card._task is not None and card._task.running:
-        card._task.take(card._world.counters[card._number])
+class DisablesNothing(QuanserDriver):
+    """Where the emergency stop is pressed."""
+
+    def disable(self) -> None:
+        """Not then."""
+        if not self.stop_pressed:
+            super().disable()
+
+
+def test_a_driver_that_disables_nothing_once_the_stop_is_pressed() -> None:
+    with pytest.raises(WrongError, match='current flows on after an emergency stop'):
+        prove({}, nothing, DisablesNothing)
+
+
+def pressed_by_current(boards: EmulatedBoards) -> None:
+    tick = boards.tick
+
+    def pressing() -> None:
+        tick()
+        boards.stop_pressed |= boards.rig.phase_current[0] > 0.4
+
+    boards.tick = pressing  # type: ignore[method-assign]
+
+
+def test_a_stop_that_is_pressed_before_its_turn_ends_the_proof() -> None:
+    with pytest.raises(WrongError, match='the emergency stop is pressed'):
+        prove({}, pressed_by_current)
+
+
+@pytest.mark.parametrize(('answer', 'seen'), [('n', False), ('yes', True)])
+def test_current_flows_on_until_somebody_answers_clearly(
+    answer: str, seen: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    terminal, keyboard = os.pipe()
+    typed = ['', '\n', '', f'{answer}\n']
+    with open(terminal) as stdin, open(keyboard, 'w', buffering=1) as keys:
+        monkeypatch.setattr('sys.stdin', stdin)
+        assert Person().sees(Sight.CURRENT, lambda: print(typed.pop(0), end='', file=keys)) == seen
+    assert not typed
 
 
 def test_the_proof_is_recorded_and_holds_for_what_was_proven(tmp_path: Path) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import enum
+import select
+import sys
 import time
 from collections.abc import Callable
 from typing import Protocol
@@ -12,6 +14,7 @@ import numpy as np
 from maglev_hw_bridge.drivers.emulated import EmulatedBoards
 
 _A_CURRENT = 0.1  # that shows at a load [A]
+Meanwhile = Callable[[], None]
 
 
 class Act(enum.Enum):
@@ -31,15 +34,12 @@ class Act(enum.Enum):
 class Sight(enum.Enum):
     """What the operator is asked for."""
 
-    CURRENT = 'did the load at motor 1 phase a carry current just now?'
+    CURRENT = 'does the load at motor 1 phase a carry current now?'
     ENABLED = 'do the amplifiers show that they are enabled now?'
 
 
 class Operator(Protocol):
     """Answers and acts."""
-
-    look: float
-    """Time needed to look at a load [s]."""
 
     def go_on(self, step: str) -> None:
         """Agree to a step, or raise StoppedError."""
@@ -53,8 +53,8 @@ class Operator(Protocol):
         """Be told to do it within the next seconds; returns at once."""
         ...
 
-    def sees(self, what: Sight) -> bool:
-        """Whether it is so."""
+    def sees(self, what: Sight, meanwhile: Meanwhile | None = None) -> bool:
+        """Whether it is so; ``meanwhile`` is called again and again until the answer is there."""
         ...
 
     def wait(self, seconds: float) -> None:
@@ -68,8 +68,6 @@ class StoppedError(Exception):
 
 class Person:
     """Somebody at the terminal; ``yes``: agrees to every step without being asked."""
-
-    look = 2.0
 
     def __init__(self, yes: bool = False) -> None:
         self._yes = yes
@@ -88,9 +86,15 @@ class Person:
         """See the protocol."""
         print(f'  {what.value} NOW', flush=True)
 
-    def sees(self, what: Sight) -> bool:
-        """See the protocol."""
-        return _agreed(f'  {what.value} [y/N] ')
+    def sees(self, what: Sight, meanwhile: Meanwhile | None = None) -> bool:
+        """See the protocol; only a clear no is one, for that is what mostly passes."""
+        answer = ''
+        while answer not in ('y', 'yes', 'n', 'no'):
+            print(f'  {what.value} [y/n] ', end='', flush=True)
+            while meanwhile is not None and not select.select([sys.stdin], [], [], 0.0)[0]:
+                meanwhile()
+            answer = input().strip().lower()
+        return answer in ('y', 'yes')
 
     def wait(self, seconds: float) -> None:
         """See the protocol."""
@@ -102,12 +106,15 @@ def _agreed(question: str) -> bool:
 
 
 class EmulatedPerson:
-    """Acts on emulated boards, and sees what is true of them."""
+    """Acts on emulated boards, and sees what is true of them.
 
-    look = 0.05
+    ``response``: how long it takes to answer [s].
+    """
 
-    def __init__(self, boards: EmulatedBoards, go_on: Callable[[str], None]) -> None:
-        self._boards = boards
+    def __init__(
+        self, boards: EmulatedBoards, go_on: Callable[[str], None], response: float = 0.05
+    ) -> None:
+        self._boards, self._response = boards, response
         self.go_on = go_on
 
     def act(self, what: Act) -> None:
@@ -124,8 +131,13 @@ class EmulatedPerson:
         """See the protocol."""
         self.act(what)
 
-    def sees(self, what: Sight) -> bool:
+    def sees(self, what: Sight, meanwhile: Meanwhile | None = None) -> bool:
         """See the protocol."""
+        if meanwhile is None:
+            self.wait(self._response)
+        else:
+            for _ in range(round(self._response / self._boards.period)):
+                meanwhile()
         if what is Sight.ENABLED:
             return self._boards.lines.enabled
         return bool(np.abs(self._boards.rig.phase_current[0]) > _A_CURRENT)

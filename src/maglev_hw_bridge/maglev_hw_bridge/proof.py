@@ -18,6 +18,7 @@ from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.signal_parameters import PHASES
 
 _CURRENT = 0.5  # through the load [A]
+_FLOW = 0.5  # for so long, before the watchdog is let expire [s]
 _PRESS = 15.0  # time to press the stop [s]
 
 
@@ -99,28 +100,28 @@ class Proof:
         finally:
             self._driver.stop()
 
-    def _drive(self, seconds: float) -> None:
-        """Ask the outputs for the current for so long, or until the stop is pressed."""
-        for _ in range(round(seconds / self._period)):
-            self._driver.read(self._counts)
-            if self._driver.stop_pressed:
-                return
-            self._driver.write(self._amplifiers.drive_phases(self._current))
+    def _sample(self) -> None:
+        """Ask the outputs for the current for a sample, whatever the emergency stop says."""
+        self._driver.read(self._counts)
+        self._driver.write(self._amplifiers.drive_phases(self._current))
+
+    def _drive(self) -> None:
+        """As that, with the emergency stop released. Raises WrongError."""
+        self._sample()
+        refuse_pressed(self._driver)
 
     def _enable_line(self) -> None:
         boards = self._boards
         with self._started():
-            self._drive(self._operator.look)
-            enabled = self._operator.sees(Sight.CURRENT)
-        with self._started():
-            self._driver.disable()
-            self._drive(self._operator.look)
-            disabled = self._operator.sees(Sight.CURRENT)
+            enabled = self._operator.sees(Sight.CURRENT, self._drive)
         if boards.enable_output < 0:
             if not enabled:
                 raise WrongError('no current flows: check amplifier.board and channel, the supply')
             self._tell('  boards.enable_output is -1: there is no enable line to prove')
             return
+        with self._started():
+            self._driver.disable()
+            disabled = self._operator.sees(Sight.CURRENT, self._drive)
         line = f'boards.enable_output ({boards.enable_output})'
         if disabled and not enabled:
             raise WrongError(f'the enable line acts the wrong way round: see to {line} and '
@@ -134,21 +135,17 @@ class Proof:
         self._tell('  enable line: current when enabled, none when disabled: pass')
 
     def _watchdog(self) -> None:
-        boards = self._boards
-        try:
-            with self._started():
-                self._drive(self._operator.look)
-                self._operator.wait(2.0 * boards.watchdog)
-                flows = self._operator.sees(Sight.CURRENT)
-                enabled = boards.enable_output >= 0 and self._operator.sees(Sight.ENABLED)
-                self._driver.write(self._amplifiers.cut())
-        except WatchdogError:
-            pass
-        else:
-            raise WrongError(
-                f'the watchdog did not expire within {2.0 * boards.watchdog:g} s: see to '
-                'boards.watchdog'
-            )
+        longest = 2.0 * self._boards.watchdog
+        with self._started():
+            for _ in range(round(_FLOW / self._period)):
+                self._drive()
+            self._operator.wait(longest)
+            if not self._expired():
+                raise WrongError(
+                    f'the watchdog did not expire within {longest:g} s: see to boards.watchdog'
+                )
+            flows = self._operator.sees(Sight.CURRENT)
+            enabled = self._boards.enable_output >= 0 and self._operator.sees(Sight.ENABLED)
         if flows:
             raise WrongError('current flows on after the watchdog expired: see to the boards')
         if enabled:
@@ -158,15 +155,28 @@ class Proof:
             )
         self._tell('  watchdog: expires in time, no current: pass')
 
+    def _expired(self) -> bool:
+        """Whether the watchdog has: then it refuses the current that flowed."""
+        try:
+            self._driver.write(self._amplifiers.volts)
+        except WatchdogError:
+            return True
+        return False
+
     def _emergency_stop(self) -> None:
         with self._started():
             self._operator.act_soon(Act.PRESS)
-            self._drive(_PRESS)
-            if not self._driver.stop_pressed:
+            for _ in range(round(_PRESS / self._period)):
+                self._sample()
+                if self._driver.stop_pressed:
+                    break
+            else:
                 raise WrongError('the emergency stop was not seen while current flowed')
             self._driver.disable()
-            self._drive(self._operator.look)
-            flows = self._operator.sees(Sight.CURRENT)
+            if self._boards.enable_output < 0:  # then it is the commands alone that end it
+                self._current[:] = 0.0
+                self._amplifiers.cut()
+            flows = self._operator.sees(Sight.CURRENT, self._sample)
         if flows:
             raise WrongError('current flows on after an emergency stop')
         self._operator.act(Act.RELEASE)
