@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import _thread
 import json
 import os
+import signal
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -79,6 +81,28 @@ def test_a_machine_that_is_right() -> None:
     assert any(f'rose 0.{height}' in told[-1] for height in (49, 50, 51))
     assert boards.rig.state[0] == 0.031
     assert boards.rig.impact < 0.05
+
+
+def test_no_signal_ends_the_lift_off_in_the_air() -> None:
+    seen: list[EmulatedBoards] = []
+
+    def asked(boards: EmulatedBoards, step: str) -> None:
+        if not step.startswith('first lift-off'):
+            return
+        seen.append(boards)
+        tick = boards.tick
+
+        def signalled() -> None:
+            tick()
+            if boards.rig.state[0] < 0.0307:
+                _thread.interrupt_main(signal.SIGINT)
+
+        boards.tick = signalled  # type: ignore[method-assign]
+
+    with pytest.raises(KeyboardInterrupt):
+        commission({}, asked)
+    assert seen[0].rig.state[0] == 0.031
+    assert seen[0].rig.impact < 0.05
 
 
 @pytest.mark.parametrize('presses_at', [0.0, 1.0])

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import _thread
 import importlib
 import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import pytest
@@ -255,6 +257,24 @@ def test_signals_interrupt_no_read() -> None:
     assert {signal.SIGINT, signal.SIGTERM, signal.SIGHUP} <= seen[0]
     assert not blocked() & {signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
     driver.close()
+
+
+def test_no_signal_breaks_off_a_close() -> None:
+    """One that another thread has taken is handled in this one, whatever it blocks."""
+    module = Module()
+    driver = started(module)
+    for card in module.cards:
+        stop = card.watchdog_stop
+        object.__setattr__(card, 'watchdog_stop', partial(_signalled, stop))
+    with pytest.raises(KeyboardInterrupt):
+        driver.close()
+    assert not any(card.open or card.watchdog for card in module.cards)
+    assert signal.getsignal(signal.SIGINT) == signal.default_int_handler
+
+
+def _signalled(call: Callable[[], object]) -> object:
+    _thread.interrupt_main(signal.SIGINT)
+    return call()
 
 
 def test_no_current_is_what_the_offset_says() -> None:

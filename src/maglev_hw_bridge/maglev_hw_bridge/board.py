@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import signal
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
@@ -36,6 +37,8 @@ _SIGNALS = (
 )
 
 
+_ENDING = (signal.SIGHUP, signal.SIGINT, signal.SIGTERM)
+
 # Python's own pthread_sigmask makes a set of enums of each mask: 8 µs more, twice a sample
 _LIBC = ctypes.PyDLL(None)
 _Mask = ctypes.c_ubyte * 128  # a sigset_t, as large as any
@@ -46,13 +49,38 @@ for _one in _SIGNALS:
 
 @contextlib.contextmanager
 def undisturbed() -> Iterator[None]:
-    """Signals go to other threads, or wait: they interrupt no call here."""
+    """Signals go to other threads, or wait: they interrupt no call here.
+
+    Where another thread takes one, what Python does about it is done in the main thread all the
+    same, also in here: :func:`unbroken` is what no exception of a signal breaks.
+    """
     before = _Mask()
     _LIBC.pthread_sigmask(int(signal.SIG_BLOCK), _BLOCKED, before)
     try:
         yield
     finally:
         _LIBC.pthread_sigmask(int(signal.SIG_SETMASK), before, None)
+
+
+@contextlib.contextmanager
+def unbroken() -> Iterator[None]:
+    """What a signal that ends the process does, it does afterwards; in the main thread."""
+    if threading.current_thread() is not threading.main_thread():  # where no signal is handled
+        yield
+        return
+    caught: list[int] = []
+
+    def catch(number: int, _frame: object) -> None:
+        caught.append(number)
+
+    before = {number: signal.signal(number, catch) for number in _ENDING}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        for noted in caught:
+            signal.raise_signal(noted)
 
 
 def channels(values: Sequence[int]) -> NDArray[np.uint32]:

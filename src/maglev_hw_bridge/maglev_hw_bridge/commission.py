@@ -19,7 +19,7 @@ from typing import NoReturn
 import numpy as np
 
 from maglev_hw_bridge.amplifiers import Amplifiers
-from maglev_hw_bridge.board import undisturbed
+from maglev_hw_bridge.board import unbroken
 from maglev_hw_bridge.diagnosis import diagnose
 from maglev_hw_bridge.doubts import doubts
 from maglev_hw_bridge.drivers import Driver, DriverError, make_driver
@@ -74,8 +74,9 @@ class Commissioning:
             self._homing()
             self._phases()
         finally:
-            self._driver.close()
-            self._memory.release()
+            with unbroken():
+                self._driver.close()
+                self._memory.release()
         self._first_lift_off()
 
     def _remember(self) -> None:
@@ -156,7 +157,7 @@ class Commissioning:
         )
         lift = Lift(self._parameters, _HOP)
         stage = BridgeStage(self._parameters, realtime=self._realtime, driver=self._driver)
-        with undisturbed():  # in the air no signal ends it
+        with unbroken():  # in the air no signal ends it
             try:
                 stage.configure()
                 stage.encoders.arrays.zero[:] = self._encoders.arrays.zero

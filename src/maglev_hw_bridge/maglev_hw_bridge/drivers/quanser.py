@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from maglev_hw_bridge.board import Board, attempt, undisturbed
+from maglev_hw_bridge.board import Board, attempt, unbroken, undisturbed
 from maglev_hw_bridge.drivers import CountArray, DriverError, VoltArray, WatchdogError
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_model.parameters import ParameterError
@@ -179,7 +179,7 @@ class QuanserDriver:
 
     def close(self) -> None:
         """No current, everything released, whatever state the boards are in."""
-        with undisturbed():
+        with unbroken(), undisturbed():
             self._make_safe()
             for board in self._boards:
                 if not board.armed:
@@ -216,7 +216,7 @@ class QuanserDriver:
 
     @contextlib.contextmanager
     def _errors(self, doing: str) -> Iterator[None]:
-        """Whatever is raised is explained, as a DriverError; signals wait."""
+        """Whatever is raised is explained, as a DriverError; signals interrupt no call."""
         with undisturbed():
             try:
                 yield
