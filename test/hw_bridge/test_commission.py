@@ -8,23 +8,26 @@ import os
 import signal
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import yaml
 from bridge_flight import HOME
 
+from maglev_hw_bridge.amplifiers import Amplifiers
 from maglev_hw_bridge.commission import Commissioning, run
 from maglev_hw_bridge.diagnosis import _explanations, diagnose
 from maglev_hw_bridge.drivers.emulated import EmulatedBoards
 from maglev_hw_bridge.drivers.quanser import QuanserDriver
 from maglev_hw_bridge.emulated_card import EmulatedCard
 from maglev_hw_bridge.memory import Memory
-from maglev_hw_bridge.operators import EmulatedPerson, Person, Sight
+from maglev_hw_bridge.operators import EmulatedPerson, Person, Sight, StoppedError
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.proof import Proof, WrongError
 from maglev_hw_bridge.response import Twins
 from maglev_model.parameters import build
+from maglev_model.stage import Fault
 
 DEFAULT = BridgeParameters()
 PEAK = 1.5
@@ -103,6 +106,91 @@ def test_no_signal_ends_the_lift_off_in_the_air() -> None:
         commission({}, asked)
     assert seen[0].rig.state[0] == 0.031
     assert seen[0].rig.impact < 0.05
+
+
+FAULT = Fault('board', 'a cable was loose', 'see to it', True)
+
+
+def remembered(tmp_path: Path, load: float, **given: object) -> tuple[dict[str, object], Memory]:
+    """Parameters with a memory of a fault, and of all phases' load."""
+    claimed = {'boards.memory': str(tmp_path / 'boards.json'), **given}
+    memory = Memory(build(BridgeParameters, claimed))
+    memory.keep(np.full(12, load), FAULT, active=False)
+    return claimed, memory
+
+
+def ends_at(step: str) -> Callable[[EmulatedBoards, str], None]:
+    def asked(_boards: EmulatedBoards, question: str) -> None:
+        if question.startswith(step):
+            raise StoppedError
+
+    return asked
+
+
+@pytest.mark.parametrize('step', ['a fault is latched', 'open', 'home', 'first lift-off'])
+def test_load_and_fault_are_kept_until_all_is_well(step: str, tmp_path: Path) -> None:
+    slow = {'amplifier.thermal_time': 600.0}
+    claimed, memory = remembered(tmp_path, 0.8, **slow)
+    with pytest.raises(StoppedError):
+        commission(claimed, ends_at(step))
+    load, fault = memory.recall()
+    assert fault == FAULT
+    assert np.all((load > 0.5) & (load < 0.8))
+
+
+def test_a_machine_that_is_right_has_no_fault_any_more(tmp_path: Path) -> None:
+    claimed, memory = remembered(tmp_path, 0.0)
+    commission(claimed)
+    assert memory.recall().fault is None
+
+
+def test_hot_amplifiers_cool_before_current_flows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = [0.0]
+
+    def sleep(seconds: float) -> None:
+        now[0] += seconds
+
+    clock = SimpleNamespace(monotonic=lambda: now[0], sleep=sleep)
+    monkeypatch.setattr('maglev_hw_bridge.commission.time', clock)
+    claimed, _ = remembered(tmp_path, 0.97, **{'amplifier.thermal_time': 600.0})
+    with pytest.raises(StoppedError):
+        commission(claimed, ends_at('home'))
+    assert 40.0 < now[0] < 80.0
+
+
+def test_a_lift_off_that_fails_keeps_a_fault(tmp_path: Path) -> None:
+    claimed, memory = remembered(tmp_path, 0.0)
+
+    def asked(boards: EmulatedBoards, step: str) -> None:
+        if step.startswith('first lift-off'):
+            for phase in range(12):
+                boards.dead(phase)
+
+    with pytest.raises(WrongError, match=r'rose 0\.00 mm'):
+        commission(claimed, asked)
+    assert memory.recall().fault == FAULT
+
+
+def test_what_is_killed_while_current_flows_comes_back_as_a_fault(tmp_path: Path) -> None:
+    claimed, memory = remembered(tmp_path, 0.0)
+    kinds: list[str] = []
+
+    def asked(boards: EmulatedBoards, step: str) -> None:
+        tick = boards.tick
+
+        def looking() -> None:
+            tick()
+            if np.max(np.abs(boards.rig.phase_current)) > 0.4:
+                boards.tick = tick  # type: ignore[method-assign]
+                kinds.append(str(memory.recall().fault))
+
+        boards.tick = looking  # type: ignore[method-assign]
+
+    commission(claimed, asked)
+    assert len(kinds) >= 6
+    assert all('the last run ended without stopping' in kind for kind in kinds)
 
 
 @pytest.mark.parametrize('presses_at', [0.0, 1.0])
@@ -250,7 +338,7 @@ def prove(
     driver.open()
     try:
         person = EmulatedPerson(boards, told.append, response=1.0)
-        Proof(parameters, driver, person, told.append).run()
+        Proof(parameters, driver, Amplifiers(parameters), person, told.append).run()
     finally:
         driver.close()
         assert not np.any(boards.volts)

@@ -55,7 +55,7 @@ def commission() -> None:
     steps._boards()
     steps._last_line()
     steps._homing()
-    Pulses(parameters, driver, steps._encoders, 1.5).phase(0)
+    Pulses(parameters, driver, steps._encoders, steps._amplifiers, 1.5).phase(0)
     driver.close()
 
 

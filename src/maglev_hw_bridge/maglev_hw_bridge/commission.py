@@ -37,7 +37,7 @@ from maglev_model.axes import FloatArray
 from maglev_model.command import leave_with
 from maglev_model.parameters import ParameterError, from_yaml
 from maglev_model.progress import add_output_options, talking
-from maglev_model.stage import StageError
+from maglev_model.stage import Fault, StageError
 
 _HOP = 5e-4  # first lift-off [m]
 
@@ -61,30 +61,71 @@ class Commissioning:
         self._realtime = parameters.driver != 'emulated'
         self._encoders = Encoders(parameters)
         self._counts = np.zeros(6, dtype=np.int32)
-        Amplifiers(parameters).drive_phases(np.zeros(PHASES))  # compiled while no watchdog runs
+        self._amplifiers = Amplifiers(parameters)
+        self._amplifiers.drive_phases(np.zeros(PHASES))  # compiled while no watchdog runs
+        self._cooling_since = time.monotonic()
+        self._fault: Fault | None = None  # latched since before, until all is well
 
     def run(self) -> None:
         """All steps. Raises WrongError, StoppedError, DriverError, StageError, ParameterError."""
         self._parameters.check_homing()
         self._memory.claim()
         try:
-            self._remember()
+            self._recall()
+            self._without_flying()
+        finally:
+            self._memory.release()
+        self._first_lift_off()
+
+    def _without_flying(self) -> None:
+        try:
             self._boards()
+            self._keep(active=True)
             self._last_line()
             self._homing()
             self._phases()
         finally:
             with unbroken():
                 self._driver.close()
-                self._memory.release()
-        self._first_lift_off()
+                with contextlib.suppress(StageError):  # what is kept then is worse
+                    self._keep(active=False)
 
-    def _remember(self) -> None:
+    def _recall(self) -> None:
         """What came before: a fault is for the operator to look into now."""
         load, fault = self._memory.recall()
         if fault is not None:
             self._ask(f'a fault is latched since before: {fault.reason}; {fault.remedy}, then on')
-        self._memory.keep(load, None, active=False)
+        self._amplifiers.arrays.load[:], self._fault = load, fault
+        self._cooling_since = time.monotonic()
+
+    def _keep(self, *, active: bool) -> None:
+        self._cool()
+        self._memory.keep(self._amplifiers.arrays.load, self._fault, active=active)
+
+    def _cool(self) -> None:
+        """What the amplifiers have cooled since current flowed, or since this was asked last."""
+        now = time.monotonic()
+        passed, self._cooling_since = now - self._cooling_since, now
+        self._amplifiers.arrays.load[:] *= np.exp(-passed / self._parameters.amplifier.thermal_time)
+
+    def _let_cool(self) -> None:
+        """Wait until they are no hotter than a bridge may be activated with."""
+        self._cool()
+        amplifier, load = self._parameters.amplifier, self._amplifiers.load
+        if load > amplifier.derate_load:
+            wait = amplifier.thermal_time * float(np.log(load / amplifier.derate_load))
+            self._tell(f'  the amplifiers are hot, I2t load {load:.2f}: they cool for {wait:.1f} s')
+            time.sleep(wait)
+            self._cool()
+
+    @contextlib.contextmanager
+    def _current(self) -> Iterator[None]:
+        """In here it may flow."""
+        self._let_cool()
+        try:
+            yield
+        finally:
+            self._cooling_since = time.monotonic()
 
     def _boards(self) -> None:
         self._ask('open and check the boards; no current')
@@ -101,7 +142,10 @@ class Commissioning:
             'prove the last line with dummy loads, up to 0.5 A in motor 1 phase a: stop input, '
             'enable line, watchdog, emergency stop'
         )
-        Proof(self._parameters, self._driver, self._operator, self._tell).run()
+        with self._current():
+            Proof(
+                self._parameters, self._driver, self._amplifiers, self._operator, self._tell
+            ).run()
         self._memory.record_proof(self._parameters)
 
     def _homing(self) -> None:
@@ -135,15 +179,18 @@ class Commissioning:
                 f'{place[1] * 1e3:.1f} mm, too far from the middle: move it, or check encoder '
                 'x and z (resolution, direction, cable)'
             )
-        pulses = Pulses(self._parameters, self._driver, self._encoders, self._peak)
+        pulses = Pulses(
+            self._parameters, self._driver, self._encoders, self._amplifiers, self._peak
+        )
         twins = Twins(self._parameters, self._peak)
         seen, foretold = [], []
         for phase in range(PHASES):
             if phase % 3 == 0:
                 self._ask(f'motor {phase // 3 + 1}: up to {self._peak:g} A in each phase alone')
             foretold.append(twins.phase(phase, pulses.place))
-            self._driver.counts(self._counts)  # and looks at the emergency stop
-            seen.append(pulses.phase(phase))
+            with self._current():
+                self._driver.counts(self._counts)  # and looks at the emergency stop
+                seen.append(pulses.phase(phase))
             self._tell(f'  {PHASE_NAMES[phase]}: {_in_words(seen[-1])}')
         finding = diagnose(np.array(seen), np.stack(foretold, axis=1))
         if not finding.fine:
@@ -155,25 +202,38 @@ class Commissioning:
             f'first lift-off by {_HOP * 1e3:g} mm for a second, then landing; the platen rests '
             'where it was homed or was moved to by hand'
         )
+        self._let_cool()
         lift = Lift(self._parameters, _HOP)
-        stage = BridgeStage(self._parameters, realtime=self._realtime, driver=self._driver)
-        with unbroken():  # in the air no signal ends it
-            try:
-                stage.configure()
-                stage.encoders.arrays.zero[:] = self._encoders.arrays.zero
-                stage.encoders.homed = True
-                stage.activate()
-                lift.fly(stage)
-            finally:
-                stage.close()
-        if stage.fault is not None:
-            raise WrongError(f'{stage.fault}; check machine.* and the currents')
+        fault = self._fly(lift)
+        if fault is not None:
+            raise WrongError(f'{fault}; check machine.* and the currents')
         seen = f'rose {lift.risen * 1e3:.2f} mm, tilted {lift.tilt * 1e3:.2f} mrad at most'
         if not lift.fine:
             raise WrongError(
                 f'it {seen}: check amplifier.gain, amplifier.offset, commutation.* and machine.*'
             )
         self._tell(f'  {seen}, landed')
+
+    def _fly(self, lift: Lift) -> Fault | None:
+        """The fault that came of it. What was latched before goes where the lift is as it is to be.
+
+        No signal ends it in the air.
+        """
+        stage = BridgeStage(self._parameters, realtime=self._realtime, driver=self._driver)
+        with unbroken():
+            try:
+                stage.configure()
+                stage.fault = None
+                stage.encoders.arrays.zero[:] = self._encoders.arrays.zero
+                stage.encoders.homed = True
+                stage.activate()
+                lift.fly(stage)
+            finally:
+                fault = stage.fault
+                if not lift.fine:
+                    stage.fault = fault or self._fault
+                stage.close()
+        return fault
 
 
 def _in_words(response: FloatArray) -> str:

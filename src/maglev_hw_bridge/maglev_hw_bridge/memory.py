@@ -1,8 +1,9 @@
 """What must outlast the process that drives the boards, and that there is only one.
 
-A small file keeps the amplifiers' I²t load and a latched fault. While a bridge is active it says
-only that: what ends without stopping, killed or without power, is a fault when it comes back, with
-the amplifiers at full load. Written when the bridge is activated, deactivated, reset and closed.
+A small file keeps the amplifiers' I²t load and a latched fault. While a bridge is active, or
+commissioned, it says only that: what ends without stopping, killed or without power, is a fault
+when it comes back, with the amplifiers at full load. Written when the bridge is activated,
+deactivated, reset and closed.
 """
 
 from __future__ import annotations

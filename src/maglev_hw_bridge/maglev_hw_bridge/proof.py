@@ -39,12 +39,13 @@ class Proof:
         self,
         parameters: BridgeParameters,
         driver: Driver,
+        amplifiers: Amplifiers,
         operator: Operator,
         tell: Callable[[str], None],
     ) -> None:
         self._boards = parameters.boards
         self._driver, self._operator, self._tell = driver, operator, tell
-        self._amplifiers = Amplifiers(parameters)
+        self._amplifiers = amplifiers
         self._period = parameters.sample_time
         self._counts = np.zeros(6, dtype=np.int32)
         self._current = np.zeros(PHASES)
@@ -94,6 +95,7 @@ class Proof:
 
     @contextlib.contextmanager
     def _started(self) -> Iterator[None]:
+        self._amplifiers.cut()
         self._driver.start()
         try:
             yield

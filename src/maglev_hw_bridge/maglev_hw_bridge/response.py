@@ -33,11 +33,15 @@ class Pulses:
     """Pulses on one set of boards; the driver must be open, and is started and stopped here."""
 
     def __init__(
-        self, parameters: BridgeParameters, driver: SampledDriver, encoders: Encoders, peak: float
+        self,
+        parameters: BridgeParameters,
+        driver: SampledDriver,
+        encoders: Encoders,
+        amplifiers: Amplifiers,
+        peak: float,
     ) -> None:
         """``peak``: largest phase current [A]."""
-        self._driver, self._encoders = driver, encoders
-        self._amplifiers = Amplifiers(parameters)
+        self._driver, self._encoders, self._amplifiers = driver, encoders, amplifiers
         self._period = parameters.sample_time
         self._peak = peak
         self._counts = np.zeros(6, dtype=np.int32)
@@ -49,6 +53,7 @@ class Pulses:
         Raises DriverError, and WrongError once the emergency stop is pressed.
         """
         refuse_pressed(self._driver)
+        self._amplifiers.cut()
         self._driver.start()
         try:
             self._sample()
@@ -135,7 +140,8 @@ class _Twin:
         twin = dataclasses.replace(parameters, emulation=emulation)
         self._rig = Rig(twin)
         self._rest = parameters.machine.gap_max
-        self._pulses = Pulses(twin, _RigDriver(self._rig), Encoders(twin), peak)
+        driver = _RigDriver(self._rig)
+        self._pulses = Pulses(twin, driver, Encoders(twin), Amplifiers(twin), peak)
 
     def phase(self, phase: int, place: FloatArray) -> FloatArray:
         self._rig.place(np.array([self._rest, place[0], place[1], 0.0, 0.0]))
