@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import _thread
 import json
-import os
 import signal
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -15,16 +14,14 @@ import pytest
 import yaml
 from bridge_flight import HOME
 
-from maglev_hw_bridge.amplifiers import Amplifiers
 from maglev_hw_bridge.commission import Commissioning, run
 from maglev_hw_bridge.diagnosis import _explanations, diagnose
 from maglev_hw_bridge.drivers.emulated import EmulatedBoards
 from maglev_hw_bridge.drivers.quanser import QuanserDriver
-from maglev_hw_bridge.emulated_card import EmulatedCard
 from maglev_hw_bridge.memory import Memory
-from maglev_hw_bridge.operators import EmulatedPerson, Person, Sight, StoppedError
+from maglev_hw_bridge.operators import EmulatedPerson, StoppedError
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_hw_bridge.proof import Proof, WrongError
+from maglev_hw_bridge.proof import WrongError
 from maglev_hw_bridge.response import Twins
 from maglev_model.parameters import build
 from maglev_model.stage import Fault
@@ -322,147 +319,3 @@ def test_it_asks_and_takes_no_for_an_answer(
     monkeypatch.setattr('builtins.input', answer)
     assert run(['--params', str(PARAMS)]) == 130
     assert 'stopped' in capsys.readouterr().err
-
-
-def prove(
-    claimed: dict[str, object],
-    spoil: Callable[[EmulatedBoards], None],
-    driver_type: type[QuanserDriver] = QuanserDriver,
-) -> list[str]:
-    """Prove the last line of a machine with both lines to one who takes a second to answer."""
-    parameters = build(BridgeParameters, {**LINES, **claimed})
-    boards = EmulatedBoards(parameters)
-    spoil(boards)
-    driver = driver_type(parameters, boards, boards.now, boards.sleep)
-    told: list[str] = []
-    driver.open()
-    try:
-        person = EmulatedPerson(boards, told.append, response=1.0)
-        Proof(parameters, driver, Amplifiers(parameters), person, told.append).run()
-    finally:
-        driver.close()
-        assert not np.any(boards.volts)
-    return told
-
-
-def nothing(_boards: EmulatedBoards) -> None:
-    """A machine that is right."""
-
-
-def test_the_last_line_is_proven() -> None:
-    told = prove({}, nothing)
-    assert [line.split(':')[0].strip() for line in told] == [
-        'stop input', 'enable line', 'watchdog', 'emergency stop',
-    ]  # fmt: skip
-    assert all(line.endswith('pass') for line in told)
-    told = prove({'boards.stop_input': -1, 'boards.enable_output': -1}, nothing)
-    assert 'no emergency stop to prove' in told[0]
-    assert 'no enable line to prove' in told[1]
-    told = prove({'boards.enable_output': -1}, nothing)
-    assert told[-1] == '  emergency stop: no current: pass'
-
-
-@pytest.mark.parametrize(
-    ('claimed', 'text'),
-    [
-        ({'emulation.wiring.stop_level': 0}, r'stop_level must be 0'),
-        ({'emulation.wiring.stop_line': 4}, r'stop_input \(0\) is another line'),
-        ({'boards.stop_level': 0}, 'broken wire'),
-        ({'emulation.wiring.enable_level': 1}, 'wrong way round'),
-        ({'emulation.wiring.enable_line': 4}, r'enable_output \(1\) is another line'),
-    ],
-)
-def test_a_last_line_that_is_wired_otherwise(claimed: dict[str, object], text: str) -> None:
-    with pytest.raises(WrongError, match=text):
-        prove(claimed, nothing)
-
-
-def never_enabled(boards: EmulatedBoards) -> None:
-    boards.lines._enable_level = 2
-
-
-def always_enabled(boards: EmulatedBoards) -> None:
-    boards.lines._enable = -1
-
-
-def stays_enabled(boards: EmulatedBoards) -> None:
-    boards.lines.let_go = lambda _expired: None  # type: ignore[method-assign]
-
-
-@pytest.mark.parametrize(
-    ('spoil', 'text'),
-    [
-        (never_enabled, 'no current flows even when enabled'),
-        (always_enabled, 'whether enabled or not'),
-        (stays_enabled, 'enabled after the watchdog expired'),
-    ],
-)
-def test_a_last_line_that_does_not_work(spoil: Callable[[EmulatedBoards], None], text: str) -> None:
-    with pytest.raises(WrongError, match=text):
-        prove({}, spoil)
-
-
-@pytest.mark.parametrize('factor', [45, 1e6])
-def test_a_watchdog_that_expires_late_or_never(
-    factor: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """By when the operator has looked, the first has expired."""
-    start = EmulatedCard.watchdog_start
-
-    def start_late(card: EmulatedCard, timeout: float) -> None:
-        start(card, factor * timeout)
-
-    monkeypatch.setattr(EmulatedCard, 'watchdog_start', start_late)
-    with pytest.raises(WrongError, match=r'did not expire within 0\.04 s'):
-        prove({}, nothing)
-
-
-class DisablesNothing(QuanserDriver):
-    """Where the emergency stop is pressed."""
-
-    def disable(self) -> None:
-        """Not then."""
-        if not self.stop_pressed:
-            super().disable()
-
-
-def test_a_driver_that_disables_nothing_once_the_stop_is_pressed() -> None:
-    with pytest.raises(WrongError, match='current flows on after an emergency stop'):
-        prove({}, nothing, DisablesNothing)
-
-
-def pressed_by_current(boards: EmulatedBoards) -> None:
-    tick = boards.tick
-
-    def pressing() -> None:
-        tick()
-        boards.stop_pressed |= boards.rig.phase_current[0] > 0.4
-
-    boards.tick = pressing  # type: ignore[method-assign]
-
-
-def test_a_stop_that_is_pressed_before_its_turn_ends_the_proof() -> None:
-    with pytest.raises(WrongError, match='the emergency stop is pressed'):
-        prove({}, pressed_by_current)
-
-
-@pytest.mark.parametrize(('answer', 'seen'), [('n', False), ('yes', True)])
-def test_current_flows_on_until_somebody_answers_clearly(
-    answer: str, seen: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    terminal, keyboard = os.pipe()
-    typed = ['', '\n', '', f'{answer}\n']
-    with open(terminal) as stdin, open(keyboard, 'w', buffering=1) as keys:
-        monkeypatch.setattr('sys.stdin', stdin)
-        assert Person().sees(Sight.CURRENT, lambda: print(typed.pop(0), end='', file=keys)) == seen
-    assert not typed
-
-
-def test_the_proof_is_recorded_and_holds_for_what_was_proven(tmp_path: Path) -> None:
-    given = {**LINES, 'boards.memory': str(tmp_path / 'boards.json')}
-    parameters = build(BridgeParameters, given)
-    memory = Memory(parameters)
-    assert not memory.proven(parameters)
-    memory.record_proof(parameters)
-    assert memory.proven(parameters)
-    assert not memory.proven(build(BridgeParameters, {**given, 'boards.enable_output': 2}))
