@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
+from supervised import STANDING, STOP, lead
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
-from maglev_model.parameters import build
+from maglev_controller.supervision import Supervisor
+from maglev_model.parameters import build, replace
+from maglev_model.phases import Phase
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
 from maglev_study.closed_loop import run
-from maglev_study.references import ellipse
+from maglev_study.references import ellipse, held
 
 PERIOD = 1e-3
 PLANT = {'effects.winding.voltage': 28.0, 'substeps': 10}
@@ -56,3 +60,40 @@ def test_what_is_asked_for_flows_in_the_windings() -> None:
     assert missed[28.0].max() < 0.02
     assert missed[0.0].max() > 0.1
     assert np.mean(missed[0.0] > 0.02) > 0.1
+
+
+NEAR = np.array([0.020, 0.0, 0.0, 0.0, 0.0])
+"""Where the platen is held off the magnets by 1 A in each motor."""
+
+
+@pytest.mark.parametrize('voltage', [0.0, 28.0])
+def test_a_voltage_that_is_given_in_flight_finds_the_currents_that_flow(voltage: float) -> None:
+    """Whether there was another before, and whatever it was."""
+    references = held(NEAR, 1.0, PERIOD)
+    stage = SimulatedStage(build(PlantParameters, {'initial.position': tuple(NEAR)}))
+    old = Regulator(build(ControllerParameters, {'winding.voltage': voltage}))
+    before = run(old, stage, references).direct_current[-1]
+    new, currents = (
+        old.retuned(replace(old.parameters, {'winding.voltage': 15.0})),
+        np.empty((2, 4)),
+    )
+    new.step(*stage.read(), *(column[0] for column in references), *currents)
+    assert before.min() > 0.9
+    np.testing.assert_allclose(currents[0], before, atol=0.01)
+
+
+@pytest.mark.parametrize('voltage', [0.0, 28.0])
+def test_a_law_that_begins_anew_at_a_step_does_not_forget_the_currents_that_flow(
+    voltage: float,
+) -> None:
+    given = {'winding.voltage': voltage, 'internal_model.restart_at_step': True}
+    supervisor = Supervisor(build(ControllerParameters, {**STANDING, **given}))
+    lead(supervisor, 0, Phase.REST, STOP, 0.031)
+    for sequence in range(1, 30):
+        lead(supervisor, sequence, Phase.TRACK, NEAR, NEAR[0])
+    before = supervisor.direct_current.copy()
+    lead(supervisor, 30, Phase.STEP, NEAR, NEAR[0], segment=1)
+    assert before.min() > 0.8
+    np.testing.assert_allclose(supervisor.direct_current, before, atol=0.2)
+    supervisor.regulator.reset()  # as before a lift-off, from where none flow
+    assert not supervisor.regulator.arrays.sample['asked'].any()

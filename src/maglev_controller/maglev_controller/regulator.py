@@ -179,13 +179,18 @@ class Regulator:
         if self.foreign is not None:
             self.foreign.parameters = self.parameters
 
-    def reset(self) -> None:
-        """Internal models at rest, observers and filters to start anew: do at every enable."""
+    def reset(self, *, in_flight: bool = False) -> None:
+        """Internal models at rest, observers and filters to start anew: do at every enable.
+
+        With ``in_flight`` the currents of the last sample are not forgotten: they flow.
+        """
         records = self._arrays.records
+        asked = records['sample']['asked'] * in_flight
         records['axes'] = np.zeros((), AXIS)
         records['axes']['fresh'] = True
         records['axes']['friction'] = self.parameters.friction.initial
         records['sample'] = np.zeros((), SAMPLE)
+        records['sample']['asked'] = asked
         self._arrays.xi[:] = 0.0
         if self.foreign is not None:
             self.foreign.reset()

@@ -220,7 +220,7 @@ class Supervisor:
             self._segment = segment
             restart = self.parameters.internal_model.restart_at_step
             if restart and phase == Phase.STEP:
-                self.regulator.reset()
+                self.regulator.reset(in_flight=True)
         self._row = row
         self._regulate(
             gap,

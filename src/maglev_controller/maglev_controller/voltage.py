@@ -87,11 +87,14 @@ def keep_within_voltage(
 ) -> bool:
     """Shorten the steps of ``direct`` and ``quadrature`` (4,) to what the voltage gives.
 
-    True when one was; ``realised`` of the sample is then what all currents make.
+    True when one was; ``realised`` of the sample is then what all currents make. ``asked`` of the
+    sample, from which the next step goes, is kept without limits too: they may be set in flight.
     """
-    return settings.winding.limits and _keep_within(
-        settings, machine, sample, axes, direct, quadrature, np.empty(4)
-    )
+    if settings.winding.limits:
+        return _keep_within(settings, machine, sample, axes, direct, quadrature, np.empty(4))
+    for motor in range(4):
+        sample.asked[motor], sample.asked[4 + motor] = direct[motor], quadrature[motor]
+    return False
 
 
 @borrowing

@@ -95,7 +95,7 @@ class Flight:
     def begin_step(self) -> None:
         """What a law that is to begin every step anew does before it."""
         if self.regulator.parameters.internal_model.restart_at_step:
-            self.regulator.reset()
+            self.regulator.reset(in_flight=True)
 
     def step(self, begin: FloatArray, target: FloatArray, time: float, hold: float) -> Run | None:
         """A step from the set-point ``begin`` to ``target`` (5,), raw for ``time`` 0 [s].
