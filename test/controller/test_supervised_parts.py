@@ -103,13 +103,13 @@ def test_a_stage_that_begins_anew_begins_with_references_of_its_own() -> None:
     assert supervisor.references.newest == -1
 
 
-def test_where_a_landing_ends_with_the_stage_only_a_fault_keeps_its_reason() -> None:
+def test_a_landing_that_ends_with_the_stage_ends_as_it_was_to_and_for_the_same_reason() -> None:
     disabled, stopped = flying(), flying()
     disabled.disable()
     stopped.stop('a stop')
     for supervisor in (disabled, stopped):
         supervisor.restart()
-    assert (disabled.mode, disabled.reason) == (Mode.WAITING, '')
+    assert (disabled.mode, disabled.reason) == (Mode.DISABLED, 'disabled')
     assert (stopped.mode, stopped.reason) == (Mode.FAULT, 'a stop')
 
 

@@ -162,11 +162,11 @@ class Supervisor:
     def restart(self) -> None:
         """The stage began anew: what was known of it, and of its reference, is void."""
         self.references.stage_began_anew()
-        if self.flying:
-            ended = self.mode == Mode.LANDING and self._after_landing == Mode.FAULT
-            self.mode = Mode.FAULT if ended else Mode.WAITING
-            self.reason = self.reason if ended else ''
-            self._may_lift_off = False
+        self._may_lift_off = False
+        if self.mode == Mode.REGULATING:
+            self.mode, self.reason = Mode.WAITING, ''
+        elif self.mode == Mode.LANDING:
+            self.mode = self._after_landing
         self._no_current()
 
     def step(self, row: int, gap: FloatArray, x: float, z: float) -> None:
