@@ -54,6 +54,37 @@ def test_an_enable_waits_for_the_next_lift_off(supervisor: Supervisor) -> None:
     assert flight.step(Phase.LIFT_OFF, STOP, 0.031) == Mode.REGULATING
 
 
+@pytest.mark.parametrize(
+    ('resting', 'unseen', 'mode'),
+    [(0, 15, Mode.REGULATING), (15, 15, Mode.REGULATING), (0, 25, Mode.WAITING)],
+)
+def test_a_lift_off_may_begin_unseen_but_is_not_followed_from_its_middle(
+    resting: int, unseen: int, mode: Mode
+) -> None:
+    """References that come late: some of the rest, then as many of the lift-off."""
+    supervisor = waiting()
+    flight = Flight(supervisor)
+    flight.step(Phase.REST, STOP, 0.031)
+    for phase in [Phase.REST] * resting + [Phase.LIFT_OFF] * unseen:
+        flight.sequence += 1
+        supervisor.step(-1, np.full(4, 0.031), 0.0, 0.0)
+        supervisor.references.store(flight.sequence, phase, 0, STOP, np.zeros(5), np.zeros(5))
+    assert flight.step(Phase.LIFT_OFF, STOP, 0.031) == mode
+    flight.step(Phase.END, STOP, 0.031)
+    assert flight.step(Phase.LIFT_OFF, STOP, 0.031) == Mode.REGULATING
+
+
+def test_another_reference_in_flight_is_not_followed_either(supervisor: Supervisor) -> None:
+    """One that comes when the first, which rested, is long gone."""
+    flight = Flight(supervisor)
+    flight.step(Phase.REST, STOP, 0.031)
+    for _ in range(500):
+        supervisor.step(-1, np.full(4, 0.031), 0.0, 0.0)
+    flight.sequence += 500
+    for _ in range(3):
+        assert flight.step(Phase.TRACK, HOVER, 0.031) == Mode.WAITING
+
+
 def test_a_landing_cannot_be_called_off(supervisor: Supervisor) -> None:
     flight = Flight(supervisor)
     flight.step(Phase.REST, STOP, 0.031)

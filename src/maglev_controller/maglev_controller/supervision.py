@@ -18,6 +18,7 @@ from maglev_model.modes import Mode
 from maglev_model.phases import Phase
 
 _CATCH_UP = 0.3  # time a landing has to bring back a platen that did not follow [s]
+_LATE = 0.02  # the rest before a lift-off that is followed is over by, at most [s]
 _FLYING_MARGIN = 5e-4  # above the lower stop, beyond encoder and stop compliance [m]
 
 
@@ -53,7 +54,7 @@ class Supervisor:
         self._gave_up = False
         self._following_watch = FollowingWatch(parameters)
         self._row = -1  # of the reference last followed
-        self._may_lift_off = False  # a reference in flight is not followed from its middle
+        self._may_lift_off = False  # a rest was seen since the enable
         self._segment = -1
         self._lower_stop = parameters.machine.gap_max
         self._hurried = hurried
@@ -190,12 +191,19 @@ class Supervisor:
             self._no_current()
 
     def _await_lift_off(self, row: int) -> None:
-        """Regulate from a lift-off on whose rest before it was seen since the enable."""
+        """Regulate from a lift-off on that begins, and where a rest was seen since the enable."""
         if not self._wants_current(row):
             self._may_lift_off = True
-        elif self._may_lift_off:
+        elif self._may_lift_off and self._just_rested(row):
             self._start_afresh()
             self.mode = Mode.REGULATING
+
+    def _just_rested(self, row: int) -> bool:
+        """Whether one of the references right before wants no current, seen in time or not."""
+        references, sequence = self.references, self.references.sequence.item(row)
+        late = round(_LATE / self.parameters.sample_time)
+        rows = (references.find(sequence - n) for n in range(1, late + 1))
+        return any(row >= 0 and not self._wants_current(row) for row in rows)
 
     def _start_afresh(self) -> None:
         self.regulator.reset()
