@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import signal
 from pathlib import Path
 
@@ -95,6 +96,20 @@ def test_the_fields_of_the_page_go_with_its_step() -> None:
         assert page.wishes.get(timeout=10.0) == ('Step', {'axis': 'x', 'distance': 1e-4})
         client.press('Land')
         assert page.wishes.get(timeout=10.0) == ('Land', {})
+
+
+@pytest.mark.parametrize('distance', [1.001, -1000.0, math.inf, math.nan])
+def test_a_step_beyond_the_field_s_bounds_is_refused_whoever_sends_it(distance: float) -> None:
+    page = Page(WebParameters(port=0), 'test')
+    with contextlib.closing(page), PageClient(page.address) as client:
+        client.wait(lambda: 'Step' in client.buttons())
+        client.enter('by [mm, mrad]', distance)
+        client.press('Step')
+        client.wait(lambda: f'a step by {distance:g} mm or mrad' in client.text())
+        assert page.wishes.empty()
+        client.enter('by [mm, mrad]', -1.0)
+        client.press('Step')
+        assert page.wishes.get(timeout=10.0) == ('Step', {'axis': 'x', 'distance': -1e-3})
 
 
 @pytest.mark.long

@@ -37,7 +37,7 @@ class PageClient:
             max_size=None,
         )
         self.messages: list[dict[str, Any]] = []
-        self._socket.send(msgspec.msgpack.encode(self._camera()))
+        self.send(self._camera())
 
     def __enter__(self) -> Self:
         return self
@@ -78,7 +78,16 @@ class PageClient:
     def press(self, label: str) -> None:
         """Click a button."""
         click = {'type': 'GuiUpdateMessage', 'uuid': self.buttons()[label]}
-        self._socket.send(msgspec.msgpack.encode({**click, 'updates': {'value': True}}))
+        self.send({**click, 'updates': {'value': True}})
+
+    def enter(self, label: str, value: float) -> None:
+        """Put a number into a field, whatever the bounds that a browser would keep to."""
+        fields = {m['props']['label']: m['uuid'] for m in self.of('GuiNumberMessage')}
+        self.send({'type': 'GuiUpdateMessage', 'uuid': fields[label], 'updates': {'value': value}})
+
+    def send(self, message: dict[str, Any]) -> None:
+        """Send any message of viser's."""
+        self._socket.send(msgspec.msgpack.encode(message))
 
     def text(self) -> str:
         """All HTML that is shown now, part by part."""

@@ -138,14 +138,19 @@ class Page:
 
     def _asks_for(self, wish: str) -> Callable[[Any], None]:
         def clicked(event: Any) -> None:
-            if wish in HARMLESS or self._knows(event.client_id):
-                self.wishes.put((wish, self._values(wish)))
-            else:
+            if wish not in HARMLESS and not self._knows(event.client_id):
                 self.answer(_STRANGE)
+                return
+            values = self._values(wish)
+            if abs(values.get('distance', 0.0)) <= 1e-3 * _STEP:
+                self.wishes.put((wish, values))
+            else:  # a browser keeps to the bounds of a field, another client need not
+                by = f'{1e3 * values["distance"]:g} mm or mrad'
+                self.answer(f'refused: a step by {by}, at most {_STEP:g} is allowed')
 
         return clicked
 
-    def _values(self, wish: str) -> Mapping[str, object]:
+    def _values(self, wish: str) -> Mapping[str, Any]:
         """What the fields beside a button say."""
         if wish != 'Step':
             return {}
