@@ -112,6 +112,23 @@ def test_a_step_beyond_the_field_s_bounds_is_refused_whoever_sends_it(distance: 
         assert page.wishes.get(timeout=10.0) == ('Step', {'axis': 'x', 'distance': -1e-3})
 
 
+def test_no_client_opens_a_tunnel_to_the_page(monkeypatch: pytest.MonkeyPatch) -> None:
+    tunnels: list[tuple[object, ...]] = []
+
+    def tunnel(*address: object) -> None:
+        tunnels.append(address)
+        raise ConnectionError
+
+    monkeypatch.setattr('viser._viser.ViserTunnel', tunnel)
+    page = Page(WebParameters(port=0), 'test')
+    with contextlib.closing(page), PageClient(page.address, origin=page.address) as client:
+        client.wait(lambda: 'Land' in client.buttons())
+        client.send({'type': 'ShareUrlRequest'})
+        client.press('Land')  # is taken after it
+        assert page.wishes.get(timeout=10.0) == ('Land', {})
+    assert tunnels == []
+
+
 @pytest.mark.long
 @needs_browser
 def test_the_page_is_dark_in_a_dark_browser_and_fits_a_phone(tmp_path: Path) -> None:

@@ -22,10 +22,20 @@ if (`${query}` !== `${asked}`) location.replace(`?${query}`);
 the whole stage. It is loaded again with what viser's client takes from the query."""
 
 
+class _Server(viser.ViserServer):
+    """Is never shared: any page of any site could ask for a tunnel from outside to this machine."""
+
+    def request_share_url(self, verbose: bool = True) -> None:
+        """Open none."""
+
+    def disconnect_share_url(self) -> None:
+        """There is none."""
+
+
 def serve(host: str, port: int, title: str = '') -> Any:
     """A server at an address and a port, or the next one that is free; 0: any."""
     with contextlib.redirect_stdout(io.StringIO()):  # its banner
-        server: Any = viser.ViserServer(host=host, port=port, label=title, verbose=False)
+        server: Any = _Server(host=host, port=port, label=title, verbose=False)
     camera = server.initial_camera
     camera.position, camera.look_at = (1.0, -1.2, 0.45), (0.2, 0.0, 0.12)
     return server
