@@ -31,6 +31,7 @@ from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 from maglev_model.progress import Progress
 from maglev_monitor.bag.analysis import analyse
 from maglev_monitor.bag.chunk_file import ChunkFile
+from maglev_monitor.bag.columns import table
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.mcap_file import McapFile
 from maglev_monitor.bag.reader import Bag
@@ -155,6 +156,18 @@ def test_a_damaged_chunk_ends_the_reading(
     counts, notes = read(tmp_path / 'bag')
     assert counts['plant'] >= len(run)
     assert 'a chunk is damaged' in notes[0]
+
+
+def test_runs_one_after_the_other_are_not_taken_for_one(
+    tmp_path: Path, run: Any, messages: dict[str, list[bytes]]
+) -> None:
+    writer = open_bag(tmp_path / 'twice')
+    write_samples(writer, run, messages)
+    write_samples(writer, run, messages)
+    writer.close()
+    for reads in (analyse, table):
+        with pytest.raises(BagError, match="twice' holds several runs"):
+            reads(tmp_path / 'twice')
 
 
 def test_a_bag_without_metadata_is_read(bag: Path, tmp_path: Path, run: Any) -> None:
@@ -294,6 +307,7 @@ import resource, sys
 sys.path.insert(0, sys.argv[1].rpartition('/')[0])
 import made_up_run
 from pathlib import Path
+from maglev_monitor.bag.columns import table
 from maglev_monitor.bag.errors import BagError
 run = made_up_run.make_run(1200)
 encoder = made_up_run.Encoder()

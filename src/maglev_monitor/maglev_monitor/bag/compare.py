@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from maglev_model.phases import Phase
 from maglev_model.wire import TOPIC_TYPES
-from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.reader import Bag, Batch
 from maglev_monitor.metrics.decoding import Records
 
@@ -80,7 +79,6 @@ class _Side:
     """One of the two bags, read as far as it is needed."""
 
     def __init__(self, bag: Bag) -> None:
-        self._path = bag.path
         self._batches: Iterator[Batch] = bag.batches()
         self._waiting: dict[str, list[Records]] = {key: [] for key in TOPIC_TYPES}
         self._newest = dict.fromkeys(TOPIC_TYPES, -1)
@@ -98,21 +96,11 @@ class _Side:
             self.exhausted = True
             return
         for key, records in batch.samples.items():
-            if key == 'measurement':
-                self._check_order(records['sequence'])
             self._waiting[key].append(records)
             self._newest[key] = max(self._newest[key], int(records['sequence'].max()))
             if key == 'reference':
                 ends = records['sequence'][records['phase'] == Phase.END]
                 self.end = min(self.end, float(ends.min())) if len(ends) else self.end
-
-    def _check_order(self, numbers: NDArray[np.integer[Any]]) -> None:
-        """A stage numbers its samples upwards until it is started again."""
-        if int(numbers[0]) < self._newest['measurement'] or np.any(np.diff(numbers) < 0):
-            raise BagError(
-                f"'{self._path}' holds several runs, whose samples have the same numbers: "
-                'compare bags of one run each'
-            )
 
     def newest(self, key: str) -> float:
         """Highest sample number of a topic; what is below it has come."""

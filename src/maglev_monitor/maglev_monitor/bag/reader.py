@@ -9,7 +9,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 import yaml
+from numpy.typing import NDArray
 from rosbags.rosbag2 import Reader
 from rosbags.rosbag2.errors import ReaderError
 from rosbags.typesys import Stores, get_typestore
@@ -59,6 +61,7 @@ class Bag:
         self.notes: list[str] = []
         self.counts: dict[str, int] = {}
         self._topics: dict[str, str] = {}  # by key
+        self._newest = -1  # number of the last sample that was measured
         self._typestore = get_typestore(Stores.ROS2_JAZZY)
 
     def custom(self) -> dict[str, str]:
@@ -75,6 +78,7 @@ class Bag:
         """The bag's content in the order it was written. Raises :class:`BagError`."""
         self.counts = {}
         self.notes.clear()
+        self._newest = -1
         try:
             for messages in self._read():
                 for topic, _, data in messages:
@@ -145,6 +149,8 @@ class Bag:
                 for message in data:
                     diagnostics += self._diagnostics(message)
         samples = {key: decode(key, data) for key, data in serialized.items()}
+        if 'measurement' in samples:
+            self._check_order(samples['measurement']['sequence'].astype(np.int64))
         return Batch(samples, diagnostics)
 
     def _only(self, key: str, topic: str) -> None:
@@ -154,6 +160,15 @@ class Bag:
                 f"the bag '{self.path}' holds more than one run, '{known}' and '{topic}': record"
                 ' each in a bag of its own'
             )
+
+    def _check_order(self, numbers: NDArray[np.int64]) -> None:
+        """A stage numbers its samples upwards until it is started again."""
+        if np.any(np.diff(numbers, prepend=self._newest) < 0):
+            raise BagError(
+                f"the bag '{self.path}' holds several runs, whose samples have the same numbers:"
+                ' record each in a bag of its own'
+            )
+        self._newest = int(numbers[-1])
 
     def _diagnostics(self, data: bytes) -> list[Diagnostic]:
         array: Any = self._typestore.deserialize_cdr(data, _DIAGNOSTICS)
