@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import html
 import json
+import os
+import re
+import shlex
 import shutil
 import sys
 from collections.abc import Sequence
@@ -203,7 +207,7 @@ def test_an_interrupted_campaign_is_called_incomplete(
     ):  # which take long, and are on the page below
         monkeypatch.setattr(f'maglev_study.robustness.page.{charts}', lambda *_: [])
     for interrupted in (False, True):
-        text = render(dataclasses.replace(whole[0], interrupted=interrupted), (), '')
+        text = render(dataclasses.replace(whole[0], interrupted=interrupted), (), {})
         assert ('class="badge incomplete"' in text) == interrupted
 
 
@@ -236,6 +240,33 @@ def test_the_page_and_the_command(
         'remanence within a grade',
     ):
         assert words in page
+
+
+def test_the_command_that_flies_the_worst_machine_finds_its_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(guarantee, 'GAPS', (0.025,))
+    monkeypatch.setattr(guarantee, 'SETS', 2)
+    law, over = tmp_path / 'my law.yaml', tmp_path / "o'er.yaml"
+    for path in (law, over):
+        path.write_text('/**: {ros__parameters: {}}\n')
+    call = [
+        '--params',
+        str(PARAMS),
+        '--machines',
+        '1',
+        '--jobs',
+        '1',
+        '--law',
+        os.path.relpath(law),
+    ]
+    call += ['--overlay', str(PARAMS / 'benchmark.yaml'), '--overlay', os.path.relpath(over)]
+    assert main([*call, '--experiment', 'step_theta', '--out', str(tmp_path)]) == DONE
+    page = html.unescape((tmp_path / 'robustness.html').read_text(encoding='utf-8'))
+    (told,) = re.findall('scenarios/robustness.sh .* --replay 1', page)
+    assert shlex.split(told)[3:-2] == [
+        *('--params', 'benchmark', '--params', str(over), '--law', str(law)),
+    ]
 
 
 def test_margins_are_those_within_the_stops(

@@ -10,6 +10,7 @@ import argparse
 import dataclasses
 import json
 import os
+import shlex
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -136,18 +137,35 @@ def _leave(
     from maglev_study.robustness.table import write_table
 
     plan = campaign.plan
-    overlays = [path.stem for path in options.overlay]
+    overlays = [_named(path, options.params) for path in options.overlay]
     words = [f'{plan.machines} machines, seed {plan.seed}']
     words += ['params ' + ', '.join(overlays)] if overlays else []
     words += ['laws ' + ', '.join(one.name for one in plan.contestants)]
-    call = ['scenarios/robustness.sh', f'--seed {plan.seed}']
-    call += [f'--params {name}' for name in overlays]
     table, note = write_table(campaign, options.out)
     if note:
         print(f'robustness: csv in place of parquet: {note}')
     path = options.out / 'robustness.html'
-    write_page(path, render(campaign, words, ' '.join(call), guaranteed, unknown))
+    write_page(path, render(campaign, words, _replays(plan, options), guaranteed, unknown))
     return [path, table]
+
+
+def _replays(plan: Plan, options: argparse.Namespace) -> dict[str, str]:
+    """By law, the command that flies a machine, but for its number."""
+    call = f'scenarios/robustness.sh --seed {plan.seed}'
+    for path in options.overlay:
+        call += f' --params {_named(path, options.params)}'
+    files = [Path(law).resolve() for law in options.law if law.endswith('.yaml')]
+    given = {one.name: f' --law {one.name}' for one in plan.contestants} | {'default': ''}
+    given |= {path.stem: f' --law {shlex.quote(str(path))}' for path in files}
+    return {one.name: f'{call}{given[one.name]} --replay' for one in plan.contestants}
+
+
+def _named(path: Path, params: Path) -> str:
+    """How an overlay is named on the command line, whatever folder that is in."""
+    path, params = path.resolve(), params.resolve()
+    if path.parent == params:
+        return shlex.quote(path.name.removesuffix('.yaml'))
+    return shlex.quote(str(path))
 
 
 def _write_machine(plan: Plan, number: int, out: Path) -> tuple[int, dict[str, Any]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -37,11 +37,11 @@ NOTES = (
 def render(
     campaign: Campaign,
     words: Sequence[str],
-    replay: str,
+    replays: Mapping[str, str],
     guaranteed: Sequence[Guarantees] = (),
     unknown: str = '',
 ) -> str:
-    """The page as HTML; ``replay`` is the command that flies a machine, but for its number.
+    """The page as HTML; ``replays`` are by law the commands that fly a machine, but for its number.
 
     ``unknown`` is why there are no guarantees.
     """
@@ -64,7 +64,7 @@ def render(
         '<h2>The worst machines</h2>',
         html_table(
             ['law', 'machine', 'experiment', 'error by nominal', '', 'to fly it'],
-            _worst_rows(found, laws, replay),
+            _worst_rows(found, replays),
         ),
         bullets('Lost', _lost(found)),
         *_margins(guaranteed, unknown, found),
@@ -184,13 +184,12 @@ def _shares() -> list[str]:
     return [f'{100 * share:g} %' for share in SHARES]
 
 
-def _worst_rows(found: Sequence[Group], laws: Sequence[str], replay: str) -> list[list[str]]:
+def _worst_rows(found: Sequence[Group], replays: Mapping[str, str]) -> list[list[str]]:
     rows = []
-    for law in laws:
+    for law, replay in replays.items():
         one = worst(found, law)
         if one is not None:
             score = 'lost' if math.isinf(one.score) else f'{one.score:.2f}'
-            by = '' if law == 'default' else f' --law {law}'
             rows.append(
                 [
                     law,
@@ -198,7 +197,7 @@ def _worst_rows(found: Sequence[Group], laws: Sequence[str], replay: str) -> lis
                     one.experiment,
                     score,
                     one.what,
-                    f'{replay} --replay {one.machine}{by}',
+                    f'{replay} {one.machine}',
                 ]
             )
     return rows
