@@ -61,8 +61,9 @@ choose_branch() {
 }
 
 check_place() {
-  [[ $root != *[[:space:]:]* ]] || fail "the folder '$root' has a space or colon in its name," \
-    'which ROS cannot build in: move it'
+  local unfit="[][:space:]:'"'"`$&;#()<>{}|*?\\[]'
+  [[ $root != *$unfit* ]] || fail "the folder '$root' has a space, colon, quote, bracket or other" \
+    'sign of the shell in its name, which ROS cannot build in: move it'
   [[ -w $root ]] || fail "cannot write to $root: make it writable, or clone elsewhere"
   command -v flock >/dev/null || fail "flock is missing: $(install_hint util-linux util-linux-core)"
   [[ $branch == native ]] || check_wheels_machine

@@ -236,9 +236,18 @@ def test_a_full_disk(machine: Machine) -> None:
     assert 'only 57 MB are free' in machine.refusal()
 
 
-def test_a_folder_name_ros_cannot_build_in(machine: Machine, tmp_path: Path) -> None:
-    machine.root = machine.root.rename(tmp_path / 'a clone')
-    assert 'has a space or colon in its name' in machine.refusal()
+@pytest.mark.parametrize('sign', [*' :\'"`$&;#()<>[]{}|*?\\'])
+def test_a_folder_name_ros_cannot_build_in(machine: Machine, tmp_path: Path, sign: str) -> None:
+    machine.root = machine.root.rename(tmp_path / f'a{sign}clone')
+    line = machine.refusal()
+    assert f"'{machine.root}' has a space, colon, quote, bracket or other sign" in line
+
+
+@needs_wheels
+def test_a_folder_name_ros_can_build_in(machine: Machine, tmp_path: Path) -> None:
+    (machine.bin / 'make').unlink()
+    machine.root = machine.root.rename(tmp_path / 'größe-1.2_a+b,c=d@e~f^g%h!')
+    assert 'missing: make' in machine.refusal()
 
 
 @needs_wheels
