@@ -133,7 +133,8 @@ check_ros_packages() {
 
 check_compiler() {
   local missing=() deb='' rpm=''
-  if ! command -v "${CXX:-c++}" >/dev/null || ! command -v "${CC:-cc}" >/dev/null; then
+  local cxx=${CXX:-c++} cc=${CC:-cc} # with their own arguments, as in 'ccache g++'
+  if ! command -v "${cxx%% *}" >/dev/null || ! command -v "${cc%% *}" >/dev/null; then
     missing+=('a C++ compiler') deb+=' g++' rpm+=' gcc-c++'
   fi
   command -v cmake >/dev/null || { missing+=(cmake) deb+=' cmake' rpm+=' cmake'; }

@@ -218,6 +218,14 @@ def test_compiler_and_cmake_are_missing(machine: Machine, manager: str, words: s
 
 
 @needs_wheels
+def test_a_compiler_may_be_given_with_arguments(machine: Machine) -> None:
+    (machine.bin / 'make').unlink()
+    given = {'CXX': 'c++ -pipe', 'CC': 'cc -pipe'}
+    assert 'missing: make:' in machine.refusal(**given)
+    assert 'missing: a C++ compiler and make:' in machine.refusal(CXX='none c++')
+
+
+@needs_wheels
 def test_a_processor_without_wheels(machine: Machine) -> None:
     machine.script('uname', '[[ $1 == -s ]] && echo Linux || echo aarch64')
     assert 'this machine is Linux aarch64' in machine.refusal()
