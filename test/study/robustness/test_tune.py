@@ -12,14 +12,16 @@ import pytest
 from maglev_controller.parameters import ControllerParameters
 from maglev_model.axes import AXES
 from maglev_model.parameters import ParameterError, from_yaml, replace
+from maglev_study.comparison.contestants import Contestant
 from maglev_study.robustness import tune as module
 from maglev_study.robustness.fleet import make_plan
 from maglev_study.robustness.fly import FLOWN, Flown
 from maglev_study.robustness.fly import LOST as LOST_FLIGHT
-from maglev_study.robustness.main import DONE, WRONG_USE
+from maglev_study.robustness.main import DONE, INTERRUPTED, WRONG_USE
 from maglev_study.robustness.tune import (
     LOST,
     Course,
+    Numbers,
     Search,
     Trial,
     Tuned,
@@ -68,6 +70,7 @@ def test_what_is_asked_has_the_margin(monkeypatch: pytest.MonkeyPatch) -> None:
         search.tell(Trial(numbers, np.array([200.0 / n['bandwidth'] for n in numbers.values()])))
     assert max(asked) <= 200.0 < 1.01 * max(asked)
     assert 190.0 < search.best()['y']['bandwidth'] <= 200.0
+    Search(contestant, 6.0, seed=2**53)
     with pytest.raises(ParameterError, match='no numbers of y are guaranteed ±50 dB'):
         Search(contestant, 50.0, seed=0).ask()
 
@@ -96,9 +99,47 @@ def test_better_is_better_on_some_and_worse_on_no_axis() -> None:
         ([2.0] * 5, False),
         ([1.0, 2.1, 1.0, 1.0, 1.0], False),
     ):
-        found = Tuned(numbers, default, Trial(numbers, np.array(worst)), 6.1)
+        found = Tuned(numbers, (default, Trial(numbers, np.array(worst))), 6.1)
         assert better(found) == verdict
         assert ('beats' in render(found, 40, 0)) == verdict
+
+
+class Known(Search):
+    """A search without a library, that knows what is best."""
+
+    def __init__(self, contestant: Contestant, *_: object) -> None:
+        self._numbers = numbers_of(contestant.controller)
+
+    def ask(self) -> Numbers:
+        return self._numbers
+
+    def tell(self, trial: Trial) -> None:
+        assert trial.numbers == self._numbers
+
+    def best(self) -> Numbers:
+        return {**self._numbers, 'y': {**self._numbers['y'], 'bandwidth': 150.0}}
+
+
+@pytest.mark.parametrize('trials', [0, 1])
+def test_ctrl_c_keeps_the_numbers_that_are_found(
+    trials: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    def interrupted(plan: Any, code: str, number: int) -> list[Flown]:
+        if plan.seed or (number and not trials):
+            raise KeyboardInterrupt
+        return flown(plan, code, number)
+
+    monkeypatch.setattr(module, 'Search', Known)
+    monkeypatch.setattr(module, 'fly_machine', interrupted)
+    call = ['--params', str(PARAMS), '--machines', '1', '--jobs', '1', '--out', str(tmp_path)]
+    assert main([*call, '--experiment', 'ellipse', '--trials', '1']) == INTERRUPTED
+    path = tmp_path / 'tuned.yaml'
+    assert path.exists() == bool(trials)
+    if trials:
+        assert 'NOT compared with the numbers as they were' in path.read_text(encoding='utf-8')
+        assert from_yaml(ControllerParameters, 'controller', path).y.bandwidth == 150.0
+    else:
+        assert 'tune: error: interrupted' in capsys.readouterr().err
 
 
 def test_the_command_leaves_parameters_that_the_controller_takes(

@@ -42,7 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def command(name: str, options: argparse.Namespace, work: Work) -> int:
     """Do the work of a command with ``--out``, and print its outcome for who wants it as JSON.
 
-    What is wrong in its use is said in a line, and is exit code 2.
+    What is wrong in its use is said in a line, and is exit code 2; Ctrl-C is exit code 130.
     """
     for variable in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS'):
         os.environ.setdefault(variable, '1')  # before NumPy: its libraries read it once
@@ -55,6 +55,8 @@ def command(name: str, options: argparse.Namespace, work: Work) -> int:
             reason = str(error)
         except OSError as error:
             reason = error.strerror or str(error)
+        except KeyboardInterrupt:
+            code, reason = INTERRUPTED, 'interrupted'
     if reason:
         print(f'{name}: error: {reason}', file=sys.stderr)
     if options.json:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -60,12 +59,12 @@ class Trial:
 class Tuned:
     """What was found: the best numbers of each axis, and how they do on machines not seen before.
 
-    ``default`` and ``best`` there; ``gain`` [dB] is what the best are guaranteed at 25 mm.
+    ``fresh`` are the default and the best numbers there, None where Ctrl-C has ended that; ``gain``
+    [dB] is what the best are guaranteed at 25 mm.
     """
 
     numbers: Numbers
-    default: Trial
-    best: Trial
+    fresh: tuple[Trial, Trial] | None
     gain: float
 
 
@@ -116,7 +115,7 @@ class Search:
         self._studies: dict[str, Any] = {}
         self._asked: dict[str, Any] = {}
         for place, (axis, numbers) in enumerate(numbers_of(contestant.controller).items()):
-            sampler = optuna.samplers.TPESampler(seed=seed + place)
+            sampler = optuna.samplers.TPESampler(seed=(seed + place) % 2**32)
             self._studies[axis] = optuna.create_study(sampler=sampler)
             self._studies[axis].enqueue_trial(dict(numbers))
 
@@ -195,24 +194,34 @@ def tune(
 
     ``margin`` [dB] is what all currents must be guaranteed at once, at 25 mm. What is found is
     judged on as many machines of the next seed. ``heard`` is told of each trial. Ctrl-C ends the
-    search with what it has.
+    search with what it has, and the judging without a verdict.
 
-    Raises ParameterError for a law without such numbers and a margin that none have, and
+    Raises ParameterError for a law without such numbers and a margin that none have,
+    KeyboardInterrupt for Ctrl-C before the first trial is done, and
     :class:`~maglev_model.optional.MissingLibraryError` without Optuna.
     """
     (contestant,) = plan.contestants
     check_tunable(contestant)
     search = Search(contestant, margin, plan.seed)
     course = Course(plan, jobs=jobs, scheduler=scheduler)
-    with contextlib.suppress(KeyboardInterrupt):
-        for number in range(trials):
+    done = 0
+    try:
+        while done < trials:
             trial = course.trial(search.ask())
             search.tell(trial)
-            heard(number, trial)
+            done += 1
+            heard(done, trial)
+    except KeyboardInterrupt:
+        if not done:
+            raise
     numbers, gain = _within(contestant, search.best(), margin)
-    fresh = Course(dataclasses.replace(plan, seed=plan.seed + 1), jobs=jobs, scheduler=scheduler)
-    default = fresh.trial(numbers_of(contestant.controller))
-    return Tuned(numbers, default, fresh.trial(numbers), gain)
+    try:
+        others = dataclasses.replace(plan, seed=plan.seed + 1)
+        fresh = Course(others, jobs=jobs, scheduler=scheduler)
+        default = fresh.trial(numbers_of(contestant.controller))
+        return Tuned(numbers, (default, fresh.trial(numbers)), gain)
+    except KeyboardInterrupt:
+        return Tuned(numbers, None, gain)
 
 
 def _within(contestant: Contestant, numbers: Numbers, margin: float) -> tuple[Numbers, float]:

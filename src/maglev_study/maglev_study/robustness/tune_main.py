@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from maglev_model.progress import Progress
-from maglev_study.robustness.main import DONE, command, command_parser, number, plan_of
+from maglev_study.robustness.main import DONE, INTERRUPTED, command, command_parser, number, plan_of
 
 if TYPE_CHECKING:
     from maglev_study.robustness.tune import Trial, Tuned
@@ -24,7 +24,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of the executable; its exit code.
 
     0: what was found is better on some axis and worse on none; 1: it is not; 2: wrong use, or a
-    library is missing.
+    library is missing; 130: interrupted before that was known, what was found is kept.
     """
     return command('tune', _parser().parse_args(arguments), _tuned)
 
@@ -37,7 +37,7 @@ def _tuned(options: argparse.Namespace) -> tuple[int, dict[str, Any]]:
 
     def heard(done: int, trial: Trial) -> None:
         worst = ' '.join(f'{one:.2f}' for one in trial.worst)
-        progress.tell(done + 1, options.trials, f', worst machines by axis {worst}')
+        progress.tell(done, options.trials, f', worst machines by axis {worst}')
 
     found = tune(
         plan,
@@ -51,12 +51,16 @@ def _tuned(options: argparse.Namespace) -> tuple[int, dict[str, Any]]:
     text = render(found, options.machines, options.seed)
     (options.out / 'tuned.yaml').write_text(text, encoding='utf-8')
     print(text, end='')
-    return (DONE if better(found) else NO_BETTER), {'numbers': found.numbers}
+    code = INTERRUPTED if found.fresh is None else DONE if better(found) else NO_BETTER
+    return code, {'numbers': found.numbers}
 
 
 def better(found: Tuned) -> bool:
     """Whether the worst machines of a fresh seed fly better on some axis, and no worse on any."""
-    change = found.best.worst - found.default.worst
+    if found.fresh is None:
+        return False
+    default, best = found.fresh
+    change = best.worst - default.worst
     return bool((change <= 0.0).all() and (change < 0.0).any())
 
 
@@ -64,15 +68,17 @@ def render(found: Tuned, machines: int, seed: int) -> str:
     """The file of parameters, which says how it was found and how it does."""
     from maglev_model.axes import AXES
 
-    verdict = 'beats' if better(found) else 'does NOT beat'
+    verdict = 'beats' if better(found) else 'does NOT beat' if found.fresh else 'NOT compared with'
     lines = [
         f'# Tuned on {machines} machines of seed {seed}; {verdict} the numbers as they were on as',
         f'# many of seed {seed + 1}. Guaranteed at 25 mm, in all currents at once: '
         f'±{found.gain:.1f} dB.',
-        '# Mean error of the worst five per cent, by the nominal one: before, after',
     ]
-    each = zip(AXES, found.default.worst, found.best.worst, strict=True)
-    lines += [f'#   {axis:6}{before:8.3f}{after:8.3f}' for axis, before, after in each]
+    if found.fresh:
+        default, best = found.fresh
+        lines.append('# Mean error of the worst five per cent, by the nominal one: before, after')
+        each = zip(AXES, default.worst, best.worst, strict=True)
+        lines += [f'#   {axis:6}{before:8.3f}{after:8.3f}' for axis, before, after in each]
     lines += ['controller:', '  ros__parameters:']
     for axis, numbers in found.numbers.items():
         told = ', '.join(f'{name}: {value:.1f}' for name, value in numbers.items())
