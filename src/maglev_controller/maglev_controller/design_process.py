@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from contextlib import ExitStack
 
 from maglev_controller.bumpless_transfer import ModelMaps, model_maps
 from maglev_controller.parameters import ControllerParameters
@@ -20,12 +21,15 @@ from maglev_model.parameters import ParameterError
 
 _LONGEST = 20.0  # [s]
 
-# Gives back the real-time priority it has from the loop it shall not disturb, before it imports.
+# Gives back the real-time priority it has from the loop it shall not disturb, before it imports;
+# what a law of somebody else's prints goes to stderr.
 _PROGRAM = """
 import os
 os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+result = os.dup(1)
+os.dup2(2, 1)
 from maglev_controller.design_process import main
-main()
+main(result)
 """
 
 
@@ -33,17 +37,23 @@ class DesignProcess:
     """A design under way; :meth:`result` once it is :attr:`done`."""
 
     def __init__(self, regulator: Regulator, parameters: ControllerParameters) -> None:
-        """Begin to design for ``parameters`` a successor of ``regulator``."""
-        self._input = tempfile.TemporaryFile()  # noqa: SIM115 - they live as long as the process
-        self._output = tempfile.TemporaryFile()  # noqa: SIM115
-        pickle.dump((regulator.arrays, parameters), self._input)
-        self._input.seek(0)
+        """Begin to design for ``parameters`` a successor of ``regulator``.
+
+        Raises ParameterError when no process can be begun.
+        """
         self._begun = time.monotonic()
-        self._process = subprocess.Popen(
-            [sys.executable, '-c', _PROGRAM],
-            stdin=self._input,
-            stdout=self._output,
-        )
+        try:
+            with ExitStack() as files:
+                self._output = files.enter_context(tempfile.TemporaryFile())
+                given = files.enter_context(tempfile.TemporaryFile())
+                pickle.dump((regulator.arrays, parameters), given)
+                given.seek(0)
+                self._process = subprocess.Popen(
+                    [sys.executable, '-c', _PROGRAM], stdin=given, stdout=self._output
+                )
+                self._files = files.pop_all()
+        except OSError as error:
+            raise ParameterError(f'no design begins: {error}; the old gains stay') from error
 
     @property
     def done(self) -> bool:
@@ -55,25 +65,30 @@ class DesignProcess:
 
     def result(self) -> tuple[Regulator, ModelMaps]:
         """The new regulator and how it takes over. Raises ParameterError when there is none."""
-        self._output.seek(0)
-        with self._input, self._output:
-            content = self._output.read()
-        if self._process.returncode != 0:
-            raise ParameterError('the design failed or took too long; the old gains stay')
-        outcome = pickle.loads(content)
+        with self._files:
+            if self._process.returncode != 0:
+                raise ParameterError('the design failed or took too long; the old gains stay')
+            try:
+                self._output.seek(0)
+                outcome = pickle.load(self._output)
+            except (OSError, EOFError, pickle.UnpicklingError) as error:
+                text = f'the design cannot be read: {error}; the old gains stay'
+                raise ParameterError(text) from error
         if isinstance(outcome, ParameterError):
             raise outcome
         regulator, maps = outcome
         return regulator, maps
 
 
-def main() -> None:
-    """Design what is asked for on stdin, and write it to stdout."""
+def main(result: int) -> None:
+    """Design what is asked for on stdin, and write it to the file descriptor ``result``."""
     arrays, parameters = pickle.load(sys.stdin.buffer)
+    outcome: tuple[Regulator, ModelMaps] | ParameterError
     try:
         regulator = Regulator(parameters)
         outcome = regulator, model_maps(arrays, regulator.arrays)
         regulator.foreign = None  # that is for the process that flies to make, or to keep
-        sys.stdout.buffer.write(pickle.dumps(outcome))
     except ParameterError as error:
-        sys.stdout.buffer.write(pickle.dumps(error))
+        outcome = error
+    with open(result, 'wb') as output:
+        pickle.dump(outcome, output)
