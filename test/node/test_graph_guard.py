@@ -20,6 +20,7 @@ from maglev_node.place import Place
 
 machines, at_end = count(1000), ExitStack()
 OTHER = SimpleNamespace(node_namespace='/', node_name='other')
+OWN = SimpleNamespace(node_namespace='/', node_name='own')
 NAMELESS = SimpleNamespace(
     node_namespace='_NODE_NAMESPACE_UNKNOWN_', node_name='_NODE_NAME_UNKNOWN_'
 )
@@ -50,6 +51,12 @@ class Node:
         self.publishers: list[Any] = []
         self.failed: list[str] = []
         self.looks: list[str] = []
+
+    def get_name(self) -> str:
+        return OWN.node_name
+
+    def get_namespace(self) -> str:
+        return OWN.node_namespace
 
     def get_publishers_info_by_topic(self, _topic: str) -> list[Any]:
         return self.publishers
@@ -96,9 +103,10 @@ def test_two_that_claim_at_once_after_a_long_start_still_find_each_other() -> No
     assert not guard.on_probation()
     guard.claim('stage/currents', 'controller')
     assert guard.on_probation()
-    node.publishers = [OTHER, OTHER]
-    node.look()
-    assert 'another controller' in node.failed[0]
+    for publishers in ([OWN, OTHER], [OTHER, OWN]):
+        node.publishers = publishers
+        node.look()
+        assert "is already published by '/other': there is another controller" in node.failed.pop()
 
 
 def test_each_claim_has_a_probation_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -124,7 +132,7 @@ def test_what_flies_stays_and_the_newcomer_leaves() -> None:
     GraphGuard(first, lambda: flies).claim('stage/measurement', 'stage')
     GraphGuard(newcomer, lambda: False).claim('stage/measurement', 'stage')
     for node in (first, newcomer):
-        node.publishers = [OTHER, OTHER]
+        node.publishers = [OWN, OTHER]
         node.look()
     assert first.failed == []
     assert 'another stage' in newcomer.failed[0]

@@ -90,7 +90,10 @@ class GraphGuard:
         """Whether what was claimed still has one publisher; otherwise the node ends."""
         publishers = self._node.get_publishers_info_by_topic(self._topic)
         if len(publishers) > 1:
-            self._node.fail(self._taken(self._topic, self._kind, publishers[0]))
+            own = self._node.get_name(), self._node.get_namespace()
+            others = (p for p in publishers if (p.node_name, p.node_namespace) != own)
+            another = next(others, publishers[0])  # of the same name
+            self._node.fail(self._taken(self._topic, self._kind, another))
         return len(publishers) <= 1
 
     def on_probation(self) -> bool:
