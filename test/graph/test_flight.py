@@ -250,6 +250,7 @@ def retune(graph: dict[str, Process], watching: Observer, bound: float) -> None:
         ({'x__bandwidth': 1e30}, 'bandwidth'),
         ({'machine__mass_y': 7.5}, 'mass_y'),
         ({'y__bandwidth': 'much'}, 'type'),
+        ({'enabled': False}, 'read-only'),
     ):
         answer = watching.set_parameters('controller', **refused)
         assert not answer.successful

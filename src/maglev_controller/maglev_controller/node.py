@@ -45,7 +45,7 @@ _SILENCE = 0.5  # without a sample for this long the stage is taken for stopped 
 class ControllerNodeParameters(SourceParameters, ControllerParameters):
     """The regulator and how its node runs it."""
 
-    enabled: bool = parameter(True, 'follow the reference from the start; false: after ~/enable')
+    enabled: bool = parameter(True, 'from the start; false: by ~/enable', read_only=True)
     reference_timeout: float = parameter(
         4.0,
         'lockstep: longest wait for a reference in flight, wall clock; then it lands',
