@@ -152,6 +152,27 @@ def test_learning_begins_with_a_period_and_ends_on_demand() -> None:
     assert learning.describe().startswith('not learning') or 'passes' in learning.describe()
 
 
+@pytest.mark.parametrize('passes', [2, 3])
+def test_another_law_goes_on_where_the_one_before_has_come(passes: int) -> None:
+    """Learns over what is left, or no more."""
+    learning, control, force = made_up(**{'learning.passes': 3})
+    for _ in range(passes):
+        pass_by(learning, control, force, factor=0.3)
+    pass_by(learning, control, force[:150])
+    changed = replace(control.parameters, {'x.bandwidth': 180.0})
+    successor, control = learning.redesigned(changed), Regulator(changed)
+    np.testing.assert_array_equal(successor.history, learning.history)
+    np.testing.assert_array_equal(successor.table, learning.table)
+    assert successor.learning == learning.learning == (passes < 3)
+    assert successor.describe() == learning.describe()
+    for each in (force, force[:150]):
+        pass_by(successor, control, each, factor=0.3)
+    assert len(successor.history) == 3
+    assert successor.arrays.state['stage'] == DONE
+    learning.end()
+    assert learning.redesigned(changed).arrays.state['stage'] == learning.arrays.state['stage']
+
+
 # -- files -----------------------------------------------------------------------------------------
 
 

@@ -46,6 +46,7 @@ from maglev_model.parameters import ParameterError
 FADING_TIME = 0.3
 """Time constant with which what is fed forward fades in, out and over [s]."""
 
+_REMEMBERED = (STATE.names or ())[(STATE.names or ()).index('stage') :]
 _WINDOW = 1.65  # half length of the filter by sample rate / (bandwidth / 2π)
 _WHOLE = 1e-6  # of a sample
 _LEAST = 0.25  # of a count: rms errors below it do not grow
@@ -114,9 +115,13 @@ class IterativeLearning:
         state['share'], state['follows'], state['recorded'], state['sum'] = 0.0, False, 0, 0.0
 
     def redesigned(self, parameters: ControllerParameters) -> IterativeLearning:
-        """The same for other parameters of the law, with what was learned."""
+        """The same at rest for other parameters of the law, as far as this one has come."""
         successor = IterativeLearning(parameters)
-        successor.table[:] = self.table
+        for name in _REMEMBERED:
+            successor.arrays.state[name] = self.arrays.state[name]
+        successor.arrays.tables[:] = self.arrays.tables
+        successor.arrays.history[:] = self.arrays.history
+        successor.rest()
         return successor
 
     def look_ahead(self, control: ControlArrays, follows: bool) -> None:

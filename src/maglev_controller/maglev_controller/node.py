@@ -295,6 +295,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
             response.message = "nothing repeats: give 'learning.period' and 'learning.passes'"
         elif request.data:
             learning.begin()
+            self._passes = 0
             response.message = f'learning over {self.parameters.learning.passes} passes'
         else:
             learning.end()
@@ -339,10 +340,8 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
     @staticmethod
     def _law(parameters: ControllerNodeParameters) -> ControllerParameters:
         """The node's parameters without those that are only the node's."""
-        table = specs(ControllerParameters)
-        return build(
-            ControllerParameters, {k: v for k, v in values(parameters).items() if k in table}
-        )
+        table, given = specs(ControllerParameters), values(parameters)
+        return build(ControllerParameters, {k: v for k, v in given.items() if k in table})
 
     def _serve_by_hand(self) -> None:
         """What the executor does for the loop and who stops it, while it is away; never long."""
