@@ -133,6 +133,7 @@ def test_on_the_ground_there_is_nothing_to_take_over() -> None:
         ({'phi.controlled': False}, "'phi.controlled' cannot change in flight"),
         ({'input_delay': 1}, "'input_delay' cannot change in flight"),
         ({'y.multiples': (0.0, 1.0, 1.0)}, 'y: .* given twice'),
+        ({'feed_forward': False}, "'feed_forward' is false: what is learned"),
         ({'rate_estimate': 'derivative', 'x.bandwidth': 1800.0}, 'x: .* unstable'),
     ],
 )
@@ -141,7 +142,8 @@ def test_what_cannot_be_is_refused_and_changes_nothing(
 ) -> None:
     """The regulator in flight is as before, bit by bit."""
     before = ellipse(0, 200)
-    old, flying = Regulator(ControllerParameters()), stage('ideal.yaml', before)
+    learns = build(ControllerParameters, {'learning.period': 0.4})
+    old, flying = Regulator(learns), stage('ideal.yaml', before)
     run(old, flying, before)
     saved = old.save()
     with pytest.raises(ParameterError, match=reason):

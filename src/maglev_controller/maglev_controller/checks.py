@@ -39,6 +39,14 @@ def check_inverse(parameters: ControllerParameters, *, linear: bool) -> None:
         )
 
 
+def check_learning(parameters: ControllerParameters) -> None:
+    """Refuse to learn what is not fed forward then."""
+    if parameters.learning.period > 0.0 and not parameters.feed_forward:
+        raise ParameterError(
+            "parameter 'feed_forward' is false: what is learned ('learning.period') is fed forward"
+        )
+
+
 def check_foreign(parameters: ControllerParameters) -> None:
     """Refuse what the law that lands in place of somebody else's has not, and too much time."""
     if parameters.inverse == 'equilibrium':

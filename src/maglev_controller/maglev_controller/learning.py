@@ -216,10 +216,6 @@ def _counts(parameters: ControllerParameters) -> FloatArray:
 
 def _check(parameters: ControllerParameters, samples: int, reach: int) -> None:
     period, sample_time = parameters.learning.period, parameters.sample_time
-    if not parameters.feed_forward:
-        raise ParameterError(
-            "parameter 'feed_forward' is false: what is learned ('learning.period') is fed forward"
-        )
     counts = period / sample_time * np.arange(1, 1001)
     whole = np.flatnonzero(np.abs(counts - np.round(counts)) < _WHOLE)
     if not whole.size or whole[0] > 0:
