@@ -56,6 +56,28 @@ def test_a_fault_is_watched_for_a_while(run: Any, messages: Messages) -> None:
     assert watch.conclude()['faults'] == ['plant: spent']
 
 
+def test_a_fault_from_before_a_run_does_not_end_its_watching(run: Any, messages: Messages) -> None:
+    watch = RunWatch(PARAMETERS, SOMEBODY, 0.0)
+    assert not watch.add_fault(int(run.stamp[10]), 'plant', 'spent', 0.0)
+    assert not watch.over(2.0)
+    watch.add(part(messages, 0, 500))
+    assert not watch.over(4.0)
+    watch.add(part(messages, 500, 1200))
+    assert watch.over(4.1)
+    assert watch.conclude()['verdict'] == 'pass'
+
+
+def test_a_fault_that_comes_before_the_samples_of_its_run_counts(
+    run: Any, messages: Messages
+) -> None:
+    watch = RunWatch(PARAMETERS, SOMEBODY, 0.0)
+    assert not watch.add_fault(int(run.stamp[400]), 'plant', 'spent', 0.0)
+    watch.add(part(messages, 0, 500))
+    assert not watch.over(3.0)
+    assert watch.over(4.1)
+    assert watch.conclude()['faults'] == ['plant: spent']
+
+
 def test_a_run_that_does_not_begin_or_falls_silent_is_given_up(messages: Messages) -> None:
     watch = RunWatch(PARAMETERS, SOMEBODY, 0.0)
     assert watch.given_up(ALL, 4.9) == ''

@@ -292,17 +292,26 @@ def test_what_comes_after_the_end_changes_nothing(records: dict[str, Records]) -
     assert figures(shorter) == figures(records)
 
 
-def test_a_fault_fails_the_run_unless_it_comes_after_the_end(
+def test_a_fault_fails_the_run_unless_it_comes_before_or_after_it(
     run: Any, records: dict[str, Records]
 ) -> None:
-    for sequence, verdict in ((500, 'fail'), (1199, 'pass')):
+    for sequence, verdict in ((30, 'pass'), (60, 'fail'), (500, 'fail'), (1199, 'pass')):
         found = with_fault(int(run.stamp[sequence]), records)
         assert found['verdict'] == verdict
         assert (found['reasons'] == ['fault in plant: spent']) == (verdict == 'fail')
 
 
-def with_fault(stamp: int, records: dict[str, Records]) -> Any:
+def test_a_fault_from_before_the_run_hides_none_of_the_run(
+    run: Any, records: dict[str, Records]
+) -> None:
+    found = with_fault(int(run.stamp[500]), records, earlier=int(run.stamp[30]))
+    assert found['reasons'] == ['fault in plant: spent']
+
+
+def with_fault(stamp: int, records: dict[str, Records], earlier: int | None = None) -> Any:
     metrics, joiner = RunMetrics(RUN), Joiner()
+    if earlier is not None:
+        metrics.add_fault(earlier, 'plant', 'spent before')
     metrics.add_fault(stamp, 'plant', 'spent')
     for key, part in records.items():
         joiner.add(key, part)
@@ -318,7 +327,10 @@ def test_a_fault_is_placed_by_the_clock_that_stamped_it(pace: float) -> None:
     messages = {key: [encoder.message(run, key, n) for n in range(len(run))] for key in TOPICS}
     records = {key: decode(key, part) for key, part in messages.items()}
     end = int(np.flatnonzero(run.phase == Phase.END)[0])
+    begin = int(np.flatnonzero(run.phase == Phase.LIFT_OFF)[0])
     for clock in (run.stamp, run.stage_time):
+        assert with_fault(int(clock[begin - 10]), records)['verdict'] == 'pass'
+        assert with_fault(int(clock[begin]), records)['verdict'] == 'fail'
         assert with_fault(int(clock[end - 10]), records)['verdict'] == 'fail'
         assert with_fault(int(clock[end]), records)['verdict'] == 'fail'
         assert with_fault(int(clock[end + 10]), records)['verdict'] == 'pass'

@@ -72,15 +72,13 @@ class RunWatch:
             self._progress.add(self._metrics.add(block))
 
     def add_fault(self, stamp: int, node: str, message: str, now: float) -> bool:
-        """Take an error a node reported at a time [ns]; whether it is the first one."""
+        """Take an error a node reported at a time [ns]; whether it is the first of the run."""
         self._metrics.add_fault(stamp, node, message)
-        if self._conclude_at is not None:
-            return False
-        self._conclude_at = now + self._parameters.fault_grace
-        return True
+        return self._has_failed(now)
 
     def over(self, now: float) -> bool:
         """Whether the run has ended, and what lags behind has come or had its time."""
+        self._has_failed(now)
         end, newest = self._joiner.end, self._joiner.newest
         ended = end is not None and newest['measurement'] >= end
         if ended and self._conclude_at is None:
@@ -88,6 +86,13 @@ class RunWatch:
         if ended and all(number > (end or 0) for number in newest.values()):
             return True
         return self._conclude_at is not None and now > self._conclude_at
+
+    def _has_failed(self, now: float) -> bool:
+        """Whether a fault of the run is known for the first time."""
+        if self._conclude_at is not None or not self._metrics.failed:
+            return False
+        self._conclude_at = now + self._parameters.fault_grace
+        return True
 
     def line(self, now: float) -> str:
         """One line of progress; also keeps who has been silent since when."""

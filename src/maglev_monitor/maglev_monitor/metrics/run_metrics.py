@@ -84,8 +84,13 @@ class RunMetrics:
             for name in run.metrics.modules
         }
         self._timing = _Timing()
-        self._faults = Faults()
+        self._faults = Faults(run.metrics.sample_time)
         self._end: Instant | None = None
+
+    @property
+    def failed(self) -> bool:
+        """Whether a node has reported an error in the run."""
+        return self.started and bool(self._faults.until(self._end))
 
     @property
     def tick_histogram(self) -> NDArray[np.int64]:
@@ -107,6 +112,7 @@ class RunMetrics:
                 return block[:0]
             self.started = True
             first = int(moving[0])
+            self._faults.begin(_instant(block[first]))
         else:
             self._skip(int(block['sequence'][0]))
         ends = np.flatnonzero(phases[first:] == Phase.END)
@@ -117,13 +123,13 @@ class RunMetrics:
         if len(rows):
             self._add_rows(rows, phases[first:last])
         if self.ended:
-            at_end = Instant(int(block['stamp'][last]), int(block['stage_time'][last]))
+            at_end = _instant(block[last])
             self._end = at_end if at_end.wall else self._timing.latest
         self._expected = int(block['sequence'][-1]) + 1
         return rows
 
     def add_fault(self, stamp: int, node: str, message: str) -> None:
-        """Take an error a node reported at a time [ns since the epoch]; its first counts."""
+        """Take an error a node reported at a time [ns since the epoch]; the run's first counts."""
         self._faults.add(stamp, node, message)
 
     def result(self) -> dict[str, Any]:
@@ -147,7 +153,7 @@ class RunMetrics:
             'repeatability': self._arrivals.result(),
             'currents': self._currents.result(),
             'timing': self._timing.result(sample_time),
-            'faults': self._faults.until(self._end, sample_time),
+            'faults': self._faults.until(self._end),
         }
         if self._further:
             figures['further'] = {name: one.result() for name, one in self._further.items()}
@@ -229,6 +235,10 @@ class RunMetrics:
         if row['phase'] == Phase.STEP and (target != start).any():
             self._step = StepTracker(self._run.metrics, start, target, int(row['sequence']))
             self._steps.append(self._step)
+
+
+def _instant(row: np.void) -> Instant:
+    return Instant(int(row['stamp']), int(row['stage_time']))
 
 
 class _Tracking:
