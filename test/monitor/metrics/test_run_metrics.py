@@ -152,6 +152,22 @@ def test_currents_and_timing(run: Any, records: dict[str, Records]) -> None:
     assert timing['real_time_factor'] == pytest.approx(factor, rel=1e-9)
 
 
+@pytest.mark.parametrize('value', [np.nan, np.inf])
+def test_currents_that_are_no_numbers_fail_a_run(value: float, records: dict[str, Records]) -> None:
+    sound = figures(records)['currents']
+    records['currents'] = records['currents'].copy()
+    records['currents']['direct_current'][[700, 710], 1] = value
+    records['currents']['quadrature_current'][710, 2] = value
+    found = figures(records)
+    assert found['verdict'] == 'fail'
+    assert found['reasons'] == [
+        'number of samples whose currents are no finite numbers is 2, allowed is none'
+    ]
+    assert found['currents']['rms'] == pytest.approx(sound['rms'], rel=1e-2)
+    assert 0.0 < found['currents']['peak_phase'] <= sound['peak_phase']
+    json.dumps(found, allow_nan=False)
+
+
 @pytest.mark.parametrize(
     ('limited_by', 'words'),
     [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import json
+import math
 import re
 import shutil
 from pathlib import Path
@@ -194,6 +195,8 @@ def test_metrics_are_written_whole_or_not_at_all(
     with pytest.raises(TypeError):
         write_metrics(path, {'verdict': object()})
     assert json.loads(path.read_text()) == {'verdict': 'pass'}
+    write_metrics(path, {'rms': [1.0, math.nan], 'timing': {'tick': math.inf}})
+    assert json.loads(path.read_text()) == {'rms': [1.0, None], 'timing': {'tick': None}}
 
 
 def test_two_runs_lie_side_by_side(bag: Path, tmp_path: Path, capsys: Any) -> None:

@@ -292,28 +292,36 @@ class _Currents:
         self._count = 0
         self._squares = np.zeros(4)
         self._peak = 0.0
+        self._not_finite = 0
         self._saturated = 0
         self._saturated_by = dict.fromkeys(LIMITS, 0)
         self._thermal_load = 0.0
 
     def add(self, rows: Records) -> None:
         driven = rows[rows['has_currents'] & rows['has_measurement']]
+        squares = np.square(driven['direct_current']) + np.square(driven['quadrature_current'])
+        known = np.isfinite(squares).all(axis=1)
+        self._not_finite += int(np.count_nonzero(~known))
         self._saturated += int(np.count_nonzero(rows['saturated']))
         for limit, bit in LIMITS.items():
             self._saturated_by[limit] += int(np.count_nonzero(rows['limited_by'] & bit))
         self._thermal_load = float(max(self._thermal_load, rows['thermal_load'].max()))
-        if not len(driven):
+        if not known.any():
             return
-        self._count += len(driven)
-        squares = np.square(driven['direct_current']) + np.square(driven['quadrature_current'])
-        self._squares += squares.sum(axis=0)
-        self._peak = max(self._peak, float(np.abs(phase_currents(driven, self._pole_pitch)).max()))
+        self._count += int(np.count_nonzero(known))
+        self._squares += squares[known].sum(axis=0)
+        phases = np.abs(phase_currents(driven[known], self._pole_pitch))
+        self._peak = max(self._peak, float(phases.max()))
 
     def result(self) -> dict[str, Any]:
-        """``rms`` is of the vector (i_d, i_q), hence sqrt(2) times that of a phase [A]."""
+        """``rms`` is of the vector (i_d, i_q), hence sqrt(2) times that of a phase [A].
+
+        Samples whose currents are no finite numbers are counted, and left out of all else.
+        """
         return {
             'peak_phase': self._peak,
             'rms': np.sqrt(self._squares / max(self._count, 1)).tolist(),
+            'not_finite_samples': self._not_finite,
             'saturated_samples': self._saturated,
             'saturated_by': dict(self._saturated_by),
             'peak_thermal_load': self._thermal_load,

@@ -92,6 +92,8 @@ def _step_reasons(figures: Mapping[str, Any], limits: RunLimits) -> Iterator[str
 
 
 def _other_reasons(figures: Mapping[str, Any], limits: RunLimits) -> Iterator[str]:
+    if count := figures['currents']['not_finite_samples']:
+        yield f'number of samples whose currents are no finite numbers is {count}, allowed is none'
     factor = figures['timing']['real_time_factor'] or 0.0
     upper = (
         ('peak phase current', figures['currents']['peak_phase'], limits.max_phase_current, ' A'),
