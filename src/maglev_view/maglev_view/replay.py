@@ -21,8 +21,9 @@ from maglev_model.command import leave_with
 from maglev_model.progress import Progress
 from maglev_monitor.bag.analysis import Analysis, analyse
 from maglev_monitor.bag.errors import BagError
+from maglev_monitor.bag.reader import run_folder
 from maglev_monitor.metrics.curves import COLUMNS
-from maglev_monitor.report.page import REPLAY, run_folder, write_page
+from maglev_monitor.report.page import REPLAY, write_page
 from maglev_view.frames import Vector, platen_pose
 
 MAGNIFIED = 10.0

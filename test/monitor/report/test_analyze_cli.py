@@ -16,6 +16,7 @@ from made_up_run import TOPICS, open_bag, write_samples
 
 from maglev_model.parameters import DIFFERS, ParameterError, build
 from maglev_monitor.bag.analysis import analyse
+from maglev_monitor.bag.export_cli import DONE, export
 from maglev_monitor.metrics.decoding import decode
 from maglev_monitor.metrics.joiner import Joiner
 from maglev_monitor.metrics.result_file import write_metrics
@@ -90,6 +91,30 @@ def test_report_goes_beside_the_bag_and_keeps_the_live_metrics(bag: Path, tmp_pa
     assert '<tr><td>plant</td><td>fan: 7 (by default 2)</td></tr>' in page
     assert 'no news' not in page
     assert (folder / 'metrics.json').read_text() == 'live'
+
+
+@pytest.mark.usefixtures('no_plots')
+def test_no_other_bag_s_metrics_stay_beside_a_report(bag: Path, tmp_path: Path) -> None:
+    shutil.copytree(bag, tmp_path / 'flight')
+    (tmp_path / 'bag').mkdir()  # of another run
+    (tmp_path / 'metrics.json').write_text('of another run')
+    assert analyze([str(tmp_path / 'flight')]) == PASS
+    assert json.loads((tmp_path / 'metrics.json').read_text())['scenario'] == 'made_up'
+
+
+@pytest.mark.usefixtures('no_plots')
+def test_of_a_lone_file_the_report_goes_beside_it(
+    bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    deep = tmp_path / 'lone' / 'deep'
+    deep.mkdir(parents=True)
+    shutil.copy(bag / 'bag_0.mcap', deep / 'flight.mcap')
+    monkeypatch.chdir(deep)
+    assert analyze(['flight.mcap']) == PASS
+    assert export(['flight.mcap', '--format', 'npz']) == DONE
+    names = {'flight.mcap', 'report.html', 'metrics.json', 'samples.npz'}
+    assert {path.name for path in deep.iterdir()} == names
+    assert [path.name for path in deep.parent.iterdir()] == ['deep']
 
 
 @pytest.mark.parametrize('kept', [('measurement', 'currents'), ('measurement',)])

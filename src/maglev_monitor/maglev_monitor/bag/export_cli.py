@@ -14,6 +14,7 @@ from maglev_model.progress import Progress
 from maglev_monitor.bag.columns import table
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.export import FORMATS, write
+from maglev_monitor.bag.reader import run_folder
 
 DONE, FAILED = 0, 2
 
@@ -24,7 +25,7 @@ def export(arguments: Sequence[str] | None = None) -> int:
     0: the run is written; 2: the bag cannot be read, or the file not be written.
     """
     options = _parser().parse_args(arguments)
-    out = options.out or _beside(options.bag).with_suffix(f'.{options.format}')
+    out = options.out or run_folder(options.bag) / f'samples.{options.format}'
     try:
         found = table(options.bag, Progress('export: read', '%', lines=False))
         written = Progress('export: written', '%', lines=False)
@@ -65,11 +66,3 @@ def _parser() -> argparse.ArgumentParser:
         '--out', type=Path, metavar='FILE', help='(default: samples.FORMAT beside the bag)'
     )
     return parser
-
-
-def _beside(bag: Path) -> Path:
-    """``samples`` in the folder of the run: that of the bag's folder, or of its file."""
-    bag = bag.resolve()
-    if bag.is_file():
-        bag = bag.parent
-    return (bag if (bag / 'bag').is_dir() else bag.parent) / 'samples'

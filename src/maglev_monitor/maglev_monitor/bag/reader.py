@@ -185,6 +185,19 @@ class Bag:
         ]
 
 
+def run_folder(bag: Path) -> Path:
+    """The folder of the run whose folder, bag or bag's file this is: its pages lie there.
+
+    A file that lies in no bag is a run in the folder that it lies in.
+    """
+    bag = bag.resolve()
+    if bag.is_file():
+        bag = bag.parent
+        if bag.name != 'bag' and not (bag / 'metadata.yaml').is_file():
+            return bag
+    return bag if (bag / 'bag').is_dir() else bag.parent
+
+
 def _find(path: Path) -> tuple[Path, list[Path]]:
     """The bag that is meant by a path, and its files in order."""
     if not path.exists():

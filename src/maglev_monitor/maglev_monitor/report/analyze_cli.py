@@ -15,8 +15,8 @@ from maglev_model.command import leave_with
 from maglev_model.progress import Progress
 from maglev_monitor.bag.analysis import Analysis, analyse
 from maglev_monitor.bag.errors import BagError
+from maglev_monitor.bag.reader import run_folder
 from maglev_monitor.metrics.result_file import write_metrics
-from maglev_monitor.report.page import run_folder
 from maglev_monitor.report.terminal import as_text
 
 PASS, NOT_PASSED, BAD_BAG = 0, 1, 2
@@ -90,6 +90,13 @@ def _write(folder: Path, bags: Sequence[Path], analyses: Sequence[Analysis]) -> 
 
     page = folder / 'report.html'
     write_report(page, analyses[0])
-    if not (folder / 'metrics.json').exists():
-        write_metrics(folder / 'metrics.json', analyses[0].result)
+    figures = folder / 'metrics.json'
+    if not (figures.exists() and _is_of(folder, bags[0])):  # those of the run's own monitor stay
+        write_metrics(figures, analyses[0].result)
     return page
+
+
+def _is_of(folder: Path, bag: Path) -> bool:
+    """Whether a folder is that of the run whose folder, bag or bag's file this is."""
+    own, bag = folder.resolve() / 'bag', bag.resolve()
+    return own.is_dir() and own in (bag / 'bag', bag, bag.parent)

@@ -89,14 +89,6 @@ def page(title: str, parts: Iterable[str]) -> str:
     return '\n'.join([head, *(part for part in parts if part), _FIT_PAPER, '</body></html>\n'])
 
 
-def run_folder(bag: Path) -> Path:
-    """The folder of the run whose folder, bag or bag's file this is: its pages lie there."""
-    bag = bag.resolve()
-    if bag.is_file():
-        bag = bag.parent
-    return bag if (bag / 'bag').is_dir() else bag.parent
-
-
 def write_page(path: Path, text: str) -> None:
     """Write a file in one go. Raises OSError when the folder cannot be written."""
     path.parent.mkdir(parents=True, exist_ok=True)
