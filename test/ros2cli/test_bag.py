@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import re
 import signal
 import time
@@ -11,8 +13,11 @@ import pytest
 from graph import Process
 from rclpy.serialization import serialize_message
 from ros2_command import COMMAND, Ros2
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
 from std_msgs.msg import String
 
+from maglev_monitor.bag.chunk_file import ChunkFile
 from maglev_monitor.bag.reader import Bag
 from maglev_monitor.bag.recorder import message_folder
 from maglev_monitor.bag.writer import BagWriter
@@ -149,3 +154,42 @@ def test_record_wants_topics(ros2: Ros2, tmp_path: Path) -> None:
     )
     assert code == 1
     assert f"QoS profiles in '{file}'" in err
+
+
+@pytest.mark.parametrize(
+    ('words', 'said'),
+    [
+        (['record', '--regex', '['], "'[' is no expression: unterminated character set"),
+        (['play', '.', '--delay', '-1'], '-1 s, it must be at least 0 s'),
+        (['play', '.', '--start-offset', 'inf'], 'inf s, it must be at least 0 s, and finite'),
+    ],
+)
+def test_what_cannot_be_meant_is_refused_in_a_line(ros2: Ros2, words: list[str], said: str) -> None:
+    code, _, err = ros2('bag', *words)
+    assert code == 2
+    assert said in err.splitlines()[-1]
+
+
+def test_info_of_a_compressed_bag(ros2: Ros2, tmp_path: Path) -> None:
+    writer = Writer(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP)
+    writer.set_compression(CompressionMode.FILE, CompressionFormat.ZSTD)
+    with writer:
+        typestore = get_typestore(Stores.ROS2_JAZZY)
+        heard = writer.add_connection('/heard', 'std_msgs/msg/String', typestore=typestore)
+        writer.write(heard, START, serialize_message(String(data='first of bag')))
+    out = ros2('bag', 'info', str(tmp_path / 'bag')).out
+    assert 'Files:             bag.mcap.zstd\n' in out
+    assert 'Storage id:        mcap\n' in out
+
+
+def test_a_disk_that_is_full_ends_a_recording_in_a_line(
+    ros2: Ros2, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(_: ChunkFile, data: bytes) -> int:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(ChunkFile, 'write', full)
+    code, _, err = ros2('bag', 'record', '-a', '-o', str(tmp_path / 'bag'))
+    assert code == 1
+    assert 'no space left on device' in err.splitlines()[-1]
+    assert err.splitlines()[-1].startswith('[ERROR] [ros2bag]: cannot ')

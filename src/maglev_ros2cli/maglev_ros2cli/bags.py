@@ -62,11 +62,16 @@ def add_overrides(parser: Parser) -> None:
     )
 
 
+def storage(path: Path) -> str:
+    """The kind of storage of a file, which may be compressed; empty for what is none."""
+    return STORAGES.get(Path(path.name.removesuffix('.zstd')).suffix, '')
+
+
 def files(path: Path) -> list[Path]:
     """The storage files of a bag, in order."""
     if path.is_file():
         return [path]
-    found = [each for each in path.iterdir() if each.suffix in STORAGES]
+    found = [each for each in path.iterdir() if storage(each)]
     return sorted(found, key=lambda each: (len(each.name), each.name))
 
 

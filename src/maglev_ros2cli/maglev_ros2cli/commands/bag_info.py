@@ -10,7 +10,7 @@ from typing import Any
 from rosbags.interfaces import Connection
 from rosbags.rosbag2 import Reader
 
-from maglev_ros2cli.bags import STORAGES, add_bag_path, files, opened
+from maglev_ros2cli.bags import add_bag_path, files, opened, storage
 from maglev_ros2cli.parser import Verbs
 
 _INDENT = 19
@@ -41,7 +41,7 @@ def _lines(reader: Reader, paths: list[Path]) -> Iterator[str]:
     yield ''
     yield from _entry('Files:', [path.name for path in paths])
     yield from _entry('Bag size:', [size(sum(path.stat().st_size for path in paths))])
-    yield from _entry('Storage id:', [STORAGES[paths[0].suffix]])
+    yield from _entry('Storage id:', [storage(paths[0])])
     yield from _entry('ROS Distro:', [reader.ros_distro or 'unknown'])
     yield from _entry('Duration:', [f'{seconds(duration)}s'])
     yield from _entry('Start:', [moment(first)])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import argparse
+import math
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -40,9 +42,12 @@ def add(verbs: Verbs) -> None:
         metavar='HZ',
         help=f'Publish to /clock at a rate, by default {_CLOCK_RATE:g} Hz',
     )
-    verb.add_argument('-d', '--delay', type=float, default=0.0, help='Sleep SEC before play')
+    verb.add_argument('-d', '--delay', type=_seconds, default=0.0, help='Sleep SEC before play')
     verb.add_argument(
-        '--start-offset', type=float, default=0.0, help='Start from this many seconds into the bag'
+        '--start-offset',
+        type=_seconds,
+        default=0.0,
+        help='Start from this many seconds into the bag',
     )
     verb.add_argument(
         '--disable-keyboard-controls', action='store_true', help='As ever: there are none'
@@ -155,4 +160,11 @@ def _positive(text: str) -> float:
     value = float(text)
     if not value > 0.0:
         raise ValueError
+    return value
+
+
+def _seconds(text: str) -> float:
+    value = float(text)
+    if not 0.0 <= value < math.inf:
+        raise argparse.ArgumentTypeError(f'{text} s, it must be at least 0 s, and finite')
     return value

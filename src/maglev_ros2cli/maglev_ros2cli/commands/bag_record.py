@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import argparse
+import contextlib
 import re
 import signal
 import sys
@@ -37,8 +39,8 @@ def add(verbs: Verbs) -> None:
     verb.add_argument('--topics', nargs='+', default=[], metavar='TOPIC', help='To record')
     verb.add_argument('-a', '--all', action='store_true', help='Record all topics')
     verb.add_argument('--all-topics', dest='all', action='store_true', help='Record all topics')
-    verb.add_argument('-e', '--regex', type=re.compile, help='Topics that contain this expression')
-    verb.add_argument('--exclude-regex', type=re.compile, help='And leave out those with this one')
+    verb.add_argument('-e', '--regex', type=_expression, help='Topics that contain this expression')
+    verb.add_argument('--exclude-regex', type=_expression, help='And leave out those with this one')
     verb.add_argument(
         '--exclude-topics', nargs='+', default=[], metavar='TOPIC', help='Leave these out'
     )
@@ -68,14 +70,13 @@ def record(arguments: Any) -> None:
     with node(arguments.node_name) as own, noted(signal.SIGINT, signal.SIGTERM) as caught:
         recorder = _Recorder(own, writer, arguments, caught)
         try:
-            writer.open()
-            own.get_logger().info('Listening for topics...')
-            discover(own, arguments.spin_time)
-            recorder.run()
+            with contextlib.closing(writer):
+                writer.open()
+                own.get_logger().info('Listening for topics...')
+                discover(own, arguments.spin_time)
+                recorder.run()
         except BagError as error:
             raise CommandError(f'[ERROR] [ros2bag]: {error}') from error
-        finally:
-            writer.close()
         own.get_logger().info('Recording stopped')
     if signal.SIGTERM in caught:
         sys.exit(128 + signal.SIGTERM)
@@ -148,6 +149,13 @@ class _Recorder:
         if given.exclude_regex and given.exclude_regex.search(topic):
             return False
         return bool(given.all or (given.regex and given.regex.search(topic)))
+
+
+def _expression(text: str) -> re.Pattern[str]:
+    try:
+        return re.compile(text)
+    except re.error as error:
+        raise argparse.ArgumentTypeError(f"'{text}' is no expression: {error}") from error
 
 
 def _known(given: Any) -> list[str]:
