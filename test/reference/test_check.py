@@ -152,6 +152,14 @@ def test_steps_are_limited_in_size(shaped):
     assert '0.02 rad' in message
 
 
+@pytest.mark.parametrize('profile', ['minimum_jerk', 'fastest'])
+def test_a_step_that_its_segment_cuts_short_is_refused(profile):
+    step = {'trajectory': 'steps', 'steps.profile': profile}
+    with pytest.raises(UnreachableError, match='step 1 takes') as caught:
+        Timeline(build(ReferenceParameters, {**step, 'duration': 0.02}))
+    assert 'its segment lasts 0.02 s (duration)' in str(caught.value)
+
+
 def test_a_step_too_quick_is_refused():
     message = refused(
         {

@@ -130,8 +130,20 @@ class Step(NamedTuple):
     jumps: bool
 
 
+def _check_time(number: int, takes: float, parameters: ReferenceParameters) -> None:
+    """Refuse a shaped step that would be cut short, and judged against where it never gets."""
+    if takes > parameters.duration + 0.5 * parameters.sample_time:
+        raise UnreachableError(
+            f'unreachable reference: step {number} takes {takes:.4g} s, its segment lasts '
+            f'{parameters.duration:g} s (duration)'
+        )
+
+
 def steps(parameters: ReferenceParameters) -> list[Step]:
-    """The steps in order. Raises UnreachableError for one larger than the limit of its axis."""
+    """The steps in order.
+
+    Raises UnreachableError for one larger than the limit of its axis, or longer than ``duration``.
+    """
     sequence = []
     table = parameters.steps
     home = np.array(parameters.home)
@@ -154,5 +166,7 @@ def steps(parameters: ReferenceParameters) -> list[Step]:
             least = minimum_jerk_time(target - start, math.inf, table.acceleration[index])
             duration = max(table.shaping_time, least)
             motion = Quintic(State.at_rest(before), State.at_rest(after), duration)
+        if isinstance(motion, Fastest | Quintic):
+            _check_time(number, motion.duration, parameters)
         sequence.append(Step(before, after, motion, not table.shaped))
     return sequence
