@@ -186,15 +186,35 @@ def test_a_bag_is_found_by_any_of_its_names(place: str, bag: Path, run: Any) -> 
     assert notes == []
 
 
+def write_sqlite(
+    path: Path, samples: range, run: Any, messages: dict[str, list[bytes]], encoder: Any
+) -> None:
+    with Writer(path, version=8, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        for key, (topic, message_type) in TOPICS.items():
+            connection = writer.add_connection(topic, message_type, typestore=encoder.store)
+            for n in samples:
+                writer.write(connection, int(run.stamp[n]), messages[key][n])
+
+
 def test_sqlite_bags_are_read(
     tmp_path: Path, run: Any, messages: dict[str, list[bytes]], encoder: Any
 ) -> None:
-    with Writer(tmp_path / 'bag', version=8, storage_plugin=StoragePlugin.SQLITE3) as writer:
-        for key, (topic, message_type) in TOPICS.items():
-            connection = writer.add_connection(topic, message_type, typestore=encoder.store)
-            for n, data in enumerate(messages[key]):
-                writer.write(connection, int(run.stamp[n]), data)
+    write_sqlite(tmp_path / 'bag', range(len(run)), run, messages, encoder)
     assert read(tmp_path / 'bag')[0] == {key: len(run) for key in TOPICS}
+
+
+def test_a_sqlite_bag_without_metadata_is_read_file_by_file(
+    tmp_path: Path, run: Any, messages: dict[str, list[bytes]], encoder: Any
+) -> None:
+    killed = tmp_path / 'killed'
+    killed.mkdir()
+    for number, samples in enumerate((range(700), range(700, len(run)))):
+        write_sqlite(tmp_path / 'bag', samples, run, messages, encoder)
+        (tmp_path / 'bag' / 'bag.db3').rename(killed / f'killed_{number}.db3')
+        shutil.rmtree(tmp_path / 'bag')
+    counts, notes = read(killed)
+    assert counts == {key: len(run) for key in TOPICS}
+    assert notes == [f"'{killed}' has no metadata.yaml: read without it"]
 
 
 @pytest.mark.parametrize(

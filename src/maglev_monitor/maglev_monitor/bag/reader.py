@@ -128,7 +128,14 @@ class Bag:
         return any(f'compression_mode: {mode}' in text for mode in ('message', 'file'))
 
     def _read_by_rosbags(self) -> Iterator[list[TopicMessages]]:
-        with Reader(self.path) as reader:
+        whole = self.path.is_file() or (self.path / 'metadata.yaml').is_file()
+        if not whole:
+            self.notes.append(f"'{self.path}' has no metadata.yaml: read without it")
+        for path in [self.path] if whole else self.files:
+            yield from self._read_one_by_rosbags(path)
+
+    def _read_one_by_rosbags(self, path: Path) -> Iterator[list[TopicMessages]]:
+        with Reader(path) as reader:
             messages = reader.messages()
             while batch := list(itertools.islice(messages, _READER_BATCH)):
                 by_topic: dict[tuple[str, str], list[bytes]] = {}
