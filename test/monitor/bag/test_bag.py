@@ -116,6 +116,21 @@ def test_a_killed_recorder_leaves_what_was_flushed(
     assert verdict == 'pass'
 
 
+@pytest.mark.parametrize('killed', [True, False])
+def test_what_a_killed_recorder_had_not_written_yet_is_not_missing(
+    killed: bool, tmp_path: Path, run: Any, messages: dict[str, list[bytes]]
+) -> None:
+    writer = open_bag(tmp_path / 'bag')
+    for key, (topic, _) in TOPICS.items():
+        count = 600 if key in ('currents', 'plant') else 800
+        writer.write(topic, zip(messages[key][:count], run.stamp[:count].tolist(), strict=True))
+    writer.flush() if killed else writer.close()
+    result = analyse(tmp_path / 'bag').result
+    writer.close()
+    assert result['verdict'] == 'incomplete'
+    assert result['missing_samples'] == (0 if killed else 400)
+
+
 @pytest.mark.parametrize('share', [0.2, 0.5, 0.9, 0.999])
 def test_a_file_cut_anywhere_gives_its_front(
     share: float, tmp_path: Path, run: Any, messages: dict[str, list[bytes]]

@@ -62,8 +62,9 @@ def analyse(path: Path, progress: Progress | None = None) -> Analysis:
         curves.add(metrics.add(block))
     if not metrics.started:
         raise BagError(f"the bag '{bag.path}' holds no run: the reference never left REST")
-    result, changes = metrics.result(), _changes(bag.path.resolve().parent / 'params')
     notes, custom = list(bag.notes), bag.custom()
+    result = metrics.result(cut_off=bool(notes))
+    changes = _changes(bag.path.resolve().parent / 'params')
     return Analysis(result, curves, run, metrics.tick_histogram, notes, changes, custom)
 
 

@@ -69,7 +69,7 @@ class RunMetrics:
         self._run_rows = 0
         self._seen = dict.fromkeys(TOPIC_TYPES, 0)
         self._holes = {key: Holes() for key in TOPIC_TYPES}
-        self._last_reference = -1  # number of the last sample with one
+        self._last = dict.fromkeys(TOPIC_TYPES, -1)  # number of the last sample with one
         self._tracking = _Tracking()
         self._arrivals = Arrivals(run.metrics.sample_time)
         self._has_own = False  # whether the stage tells what its encoders' own scales have
@@ -132,8 +132,11 @@ class RunMetrics:
         """Take an error a node reported at a time [ns since the epoch]; the run's first counts."""
         self._faults.add(stamp, node, message)
 
-    def result(self) -> dict[str, Any]:
-        """The content of ``metrics.json``; complete only when the run has reached its end."""
+    def result(self, *, cut_off: bool = False) -> dict[str, Any]:
+        """The content of ``metrics.json``; complete only when the run has reached its end.
+
+        :param cut_off: whether what was still to come may have been written no more.
+        """
         run, source = self._run, _TRUE if self._seen['plant'] else _MEASURED
         sample_time = run.metrics.sample_time
         figures: dict[str, Any] = {
@@ -143,7 +146,7 @@ class RunMetrics:
             'duration': self._measured_samples * sample_time,
             'samples': self._measured_samples,
             'run_samples': self._run_rows,
-            **self._missing_result(),
+            **self._missing_result(cut_off),
             'error_source': SOURCES[source],
             'axes': self._tracking.result(source),
             'measured_axes': self._tracking.result(_MEASURED),
@@ -162,11 +165,12 @@ class RunMetrics:
     def _step_results(self, source: int) -> list[dict[str, Any]]:
         return [entry for step in self._steps for entry in step.results(source)]
 
-    def _missing_result(self) -> dict[str, Any]:
+    def _missing_result(self, cut_off: bool) -> dict[str, Any]:
         """By topic; a landing after a reference that was ended is no loss of the reference."""
         holes = copy.deepcopy(self._holes)
-        if self._seen['reference'] and not self.ended:
-            holes['reference'].drop_from(self._last_reference + 1)
+        for key in () if self.ended else TOPIC_TYPES if cut_off else ('reference',):
+            if self._seen[key]:
+                holes[key].drop_from(self._last[key] + 1)
         by_topic = {
             key: found for key, found in holes.items() if self._seen[key] or key not in _OPTIONAL
         }
@@ -193,13 +197,13 @@ class RunMetrics:
         self._run_rows += len(rows)
         for key in TOPIC_TYPES:
             present = rows[f'has_{key}']
+            if present.any():
+                self._last[key] = int(rows['sequence'][present][-1])
             self._seen[key] += int(np.count_nonzero(present))
             self._holes[key].add(rows['sequence'][~present])
         position = positions(rows, self._run.machine.radius)
         self._has_own = self._has_own or bool(np.isfinite(rows['own_length']).any())
         referenced = rows['has_reference']
-        if np.any(referenced):
-            self._last_reference = int(rows['sequence'][referenced][-1])
         measured = referenced & np.isin(phases, (Phase.TRACK, Phase.STEP))
         self._measured_samples += int(np.count_nonzero(measured))
         tracked = referenced & (phases == Phase.TRACK)
