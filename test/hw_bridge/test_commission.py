@@ -25,6 +25,7 @@ from maglev_hw_bridge.proof import WrongError
 from maglev_hw_bridge.response import Twins
 from maglev_model.parameters import build
 from maglev_model.stage import Fault
+from maglev_node import realtime
 
 DEFAULT = BridgeParameters()
 PEAK = 1.5
@@ -65,7 +66,9 @@ def commission(
             asked(boards, step)
 
     operator = EmulatedPerson(boards, go_on)
-    steps = Commissioning(parameters, driver, peak=PEAK, operator=operator, tell=told.append)
+    steps = Commissioning(
+        parameters, driver, peak=PEAK, operator=operator, tell=told.append, priority=40
+    )
     try:
         steps.run()
     finally:
@@ -81,6 +84,34 @@ def test_a_machine_that_is_right() -> None:
     assert any(f'rose 0.{height}' in told[-1] for height in (49, 50, 51))
     assert boards.rig.state[0] == 0.031
     assert boards.rig.impact < 0.05
+
+
+def test_the_first_lift_off_of_real_boards_is_on_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    order: list[object] = []
+    monkeypatch.setattr(realtime, 'take', lambda priority: order.append(priority) or ['a thing'])
+    monkeypatch.setattr(realtime, 'give_priority_back', lambda: order.append('given back'))
+
+    def asked(boards: EmulatedBoards, step: str) -> None:
+        if not step.startswith('first lift-off'):
+            return
+        tick = boards.tick
+
+        def flying() -> None:
+            tick()
+            if boards.rig.state[0] < 0.0307 and order[-1] != 'flies':
+                order.append('flies')
+
+        boards.tick = flying  # type: ignore[method-assign]
+
+    real = {'driver': 'quanser', 'homing.at_start': False, 'boards.memory': str(tmp_path / 'it')}
+    told, _ = commission(real, asked)
+    assert order == [40, 'flies', 'given back']
+    assert '  not permitted: a thing: samples may come late' in told
+    order.clear()
+    commission({})
+    assert not order
 
 
 def test_no_signal_ends_the_lift_off_in_the_air() -> None:

@@ -14,7 +14,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
@@ -39,6 +39,9 @@ from maglev_model.parameters import ParameterError, from_yaml
 from maglev_model.progress import add_output_options, talking
 from maglev_model.stage import Fault, StageError
 
+if TYPE_CHECKING:
+    from maglev_hw_bridge.node import BridgeNodeParameters
+
 _HOP = 5e-4  # first lift-off [m]
 
 
@@ -53,11 +56,14 @@ class Commissioning:
         peak: float,
         operator: Operator,
         tell: Callable[[str], None] = print,
+        priority: int = 0,
     ) -> None:
+        """``peak``: largest current of a phase alone [A]; ``priority`` in the air, real-time."""
         self._parameters, self._driver = parameters, driver
         self._peak, self._operator, self._tell = peak, operator, tell
         self._ask = operator.go_on
         self._memory = Memory(parameters)
+        self._priority = priority
         self._realtime = parameters.driver != 'emulated'
         self._encoders = Encoders(parameters)
         self._counts = np.zeros(6, dtype=np.int32)
@@ -220,7 +226,7 @@ class Commissioning:
         No signal ends it in the air.
         """
         stage = BridgeStage(self._parameters, realtime=self._realtime, driver=self._driver)
-        with unbroken():
+        with self._on_time(), unbroken():
             try:
                 stage.configure()
                 stage.fault = None
@@ -234,6 +240,22 @@ class Commissioning:
                     stage.fault = fault or self._fault
                 stage.close()
         return fault
+
+    @contextlib.contextmanager
+    def _on_time(self) -> Iterator[None]:
+        """With real boards, what the operating system gives a process that must be on time."""
+        if not self._realtime:
+            yield
+            return
+        from maglev_node import realtime  # with the nodes, only needed here
+
+        refused = realtime.take(self._priority)
+        if refused:
+            self._tell(f'  not permitted: {", ".join(refused)}: samples may come late')
+        try:
+            yield
+        finally:
+            realtime.give_priority_back()
 
 
 def _in_words(response: FloatArray) -> str:
@@ -272,7 +294,7 @@ def _ended_by_signals() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _load(files: Sequence[str]) -> BridgeParameters:
+def _load(files: Sequence[str]) -> BridgeNodeParameters:
     from maglev_hw_bridge.node import BridgeNodeParameters  # with ROS, only needed here
 
     return from_yaml(BridgeNodeParameters, 'hw_bridge', *files)
@@ -323,7 +345,12 @@ def _commission(options: argparse.Namespace, said: list[str]) -> int:
         operator = _operator(driver, options.yes)
         with _ended_by_signals():
             Commissioning(
-                parameters, driver, peak=options.current, operator=operator, tell=tell
+                parameters,
+                driver,
+                peak=options.current,
+                operator=operator,
+                tell=tell,
+                priority=parameters.realtime_priority,
             ).run()
     except WrongError as error:
         said.append(f'wrong: {error}')

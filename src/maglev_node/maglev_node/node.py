@@ -150,14 +150,7 @@ class MaglevNode(PollingNode, Generic[P]):
         parameters: Any = self.parameters
         if parameters.mode != 'realtime':
             return
-        realtime.keep_heap()
-        if parameters.realtime_priority == 0:
-            return
-        refused = []
-        if not realtime.take_priority(parameters.realtime_priority):
-            refused.append('real-time priority (see ulimit -r)')
-        if not realtime.lock_memory():
-            refused.append('locking memory (see ulimit -l)')
+        refused = realtime.take(parameters.realtime_priority)
         if refused and not self._said_refused:
             self._said_refused = True
             self.get_logger().warning(f'not permitted: {", ".join(refused)}: samples may come late')

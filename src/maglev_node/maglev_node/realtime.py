@@ -24,6 +24,19 @@ _CURRENT, _FUTURE, _ON_FAULT = 1, 2, 4  # mlockall(2)
 _TRIM_THRESHOLD, _MMAP_MAX = -1, -4  # mallopt(3)
 
 
+def take(priority: int) -> list[str]:
+    """Keep the heap, take ``priority`` and lock memory unless it is 0; what is not permitted."""
+    keep_heap()
+    refused: list[str] = []
+    if priority == 0:
+        return refused
+    if not take_priority(priority):
+        refused.append('real-time priority (see ulimit -r)')
+    if not lock_memory():
+        refused.append('locking memory (see ulimit -l)')
+    return refused
+
+
 def take_priority(priority: int) -> bool:
     """Put all threads of this process under SCHED_FIFO; whether that is permitted (ulimit -r).
 
