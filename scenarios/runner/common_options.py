@@ -36,6 +36,10 @@ def talk(given: Mapping[str, list[str]]) -> None:
         talk_to(2)
 
 
-def as_given(given: Mapping[str, list[str]], *names: str) -> list[str]:
-    """Some of the options as they were given, for another program."""
-    return [part for name in names if name in given for part in (name, *given[name])]
+def as_given(table: Mapping[str, Option], given: Mapping[str, list[str]], *names: str) -> list[str]:
+    """Some options of a table as they were given, for another program; the last value wins."""
+    words: list[str] = []
+    for name in names:
+        if name in given:
+            words += [name, *(given[name] if table[name].several else given[name][-1:])]
+    return words

@@ -44,7 +44,7 @@ def _compare(options: Sequence[str]) -> Job:
     }
     given = Command('compare.sh', COMPARE, table).parse(options)
     arguments = ['--params', str(PARAMS), '--out', str(out_folder('compare', given))]
-    arguments += as_given(given, '--quick', '--laws', '--bandwidth', *OUTPUT)
+    arguments += as_given(table, given, '--quick', '--laws', '--bandwidth', *OUTPUT)
     overlays = given.get('--params', [])
     for file in overlays:
         arguments += ['--overlay', file]
@@ -67,7 +67,7 @@ def _faults(options: Sequence[str]) -> Job:
     given = Command('faults.sh', FAULTS, table).parse(options)
     arguments = ['--out', str(out_folder('faults', given))]
     names = ('--runs', '--seed', '--jobs', '--double', '--short', '--replay', *OUTPUT)
-    arguments += as_given(given, *names)
+    arguments += as_given(table, given, *names)
     return partial(_become, 'maglev_study', 'faults', arguments)
 
 
@@ -95,9 +95,8 @@ def _robustness(options: Sequence[str]) -> Job:
     given = Command(f'{name}.sh', ROBUSTNESS, table).parse(options)
     out, overlays = out_folder(name, given), given.get('--params', [])
     arguments = ['--params', str(PARAMS), '--out', str(out)]
-    arguments += as_given(given, '--machines', '--seed', '--jobs', '--scheduler', '--replay')
-    for several in ('--law', '--experiment'):
-        arguments += [several, *given[several]] if several in given else []
+    names = ('--machines', '--seed', '--jobs', '--scheduler', '--replay', '--law', '--experiment')
+    arguments += as_given(table, given, *names)
     for file in overlays:
         arguments += ['--overlay', file]
     if '--replay' in given:
@@ -110,7 +109,7 @@ def _robustness(options: Sequence[str]) -> Job:
             as_json='--json' in given,
         )
         return partial(_replay_machine, machine, arguments, overlays)
-    arguments += as_given(given, *OUTPUT)
+    arguments += as_given(table, given, *OUTPUT)
     return partial(_become, 'maglev_study', name, arguments, overlays, HEARD_BY_ROBUSTNESS)
 
 
@@ -140,7 +139,7 @@ def _tune(options: Sequence[str]) -> Job:
     overlays = given.get('--params', [])
     arguments = ['--params', str(PARAMS), '--out', str(out_folder(name, given))]
     passed = set(table) - {'--params', '--out'}
-    arguments += as_given(given, *sorted(passed))
+    arguments += as_given(table, given, *sorted(passed))
     for file in overlays:
         arguments += ['--overlay', file]
     return partial(_become, 'maglev_study', name, arguments, overlays, HEARD_BY_ROBUSTNESS)
@@ -176,7 +175,7 @@ def _commission(options: Sequence[str]) -> Job:
     arguments = []
     for file in [*(str(file) for file in files if file.is_file()), *overlays]:
         arguments += ['--params', file]
-    arguments += as_given(given, '--current', '--yes', *OUTPUT)
+    arguments += as_given(table, given, '--current', '--yes', *OUTPUT)
     return partial(_become, 'maglev_hw_bridge', 'commission', arguments, overlays)
 
 

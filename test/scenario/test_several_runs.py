@@ -242,12 +242,13 @@ def test_an_overlay_may_speak_to_others_too_but_not_to_none(tree: Tree) -> None:
 
 def test_the_fault_campaign_is_told_what_the_user_wants(tree: Tree) -> None:
     tree.behave('faults', '1')
-    assert tree.finish('--runs', '40', '--double', '--out', 'here', script='faults') == (1, '')
+    options = ('--runs', '9', '--double', '--runs', '40', '--out', 'here')
+    assert tree.finish(*options, script='faults') == (1, '')
     assert tree.history('faults') == ['--out here --runs 40 --double']
 
 
 def test_the_drawn_machines_are_told_what_the_user_wants(tree: Tree) -> None:
-    options = ('--machines=4', '--law', 'paper', 'default', '--out', 'here')
+    options = ('--machines=4', '--law', 'paper', '--law', 'default', '--out', 'here')
     assert tree.finish(*options, '--params', 'soft', script='robustness') == (0, '')
     params = tree.path / 'params'
     assert tree.history('robustness') == [
