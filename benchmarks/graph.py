@@ -134,13 +134,13 @@ class Flown(NamedTuple):
     spent: dict[str, float]  # by node, CPU time in a tick
 
 
-def scenario(folder: Path, duration: float, watch: Watch) -> Flown:
-    """Run the ellipse."""
+def scenario(folder: Path, duration: float, watch: Watch, *options: str) -> Flown:
+    """Run the ellipse, with options of its script."""
     watch.spent.clear()
     began = time.time()
     called = [str(ROOT / 'scenarios' / 'ellipse.sh')]
     done = subprocess.run(
-        [*called, '--duration', str(duration), '--out', folder],
+        [*called, '--duration', str(duration), '--out', str(folder), *options],
         capture_output=True,
         text=True,
     )

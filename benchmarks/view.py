@@ -17,7 +17,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from graph import scenario
+from graph import Watch, scenario
 
 WATCHER = """
 import rclpy
@@ -65,15 +65,17 @@ def main() -> int:
         help='measured time of a run [s]; in a short one the start of the views counts',
     )
     options = parser.parse_args()
+    watch = Watch()
+    watch.start()
     factors: dict[str, list[float]] = {name: [] for name in CASES}
     for number in range(options.rounds):
         for name, (given, seen) in CASES.items():
             with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as around:
                 if seen:
                     around.enter_context(watched())
-                _, factor, _ = scenario(Path(folder) / 'run', options.duration, *given)
-            factors[name].append(factor)
-            print(f'round {number + 1}: {name}: {factor:.2f} x real time', flush=True)
+                run = scenario(Path(folder) / 'run', options.duration, watch, *given)
+            factors[name].append(run.factor)
+            print(f'round {number + 1}: {name}: {run.factor:.2f} x real time', flush=True)
     ratios = {
         name: statistics.median(a / b for a, b in zip(found, factors['no view'], strict=True))
         for name, found in factors.items()
