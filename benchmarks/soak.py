@@ -63,6 +63,7 @@ SETTLED = 120.0  # after which a node has all it needs [s]
 GROWTH = 5.0  # of a node's memory, from then on [MB an hour]
 SLACK = 2.0  # by which two looks at the same may differ [MB]
 PERIOD = 5.0  # between two looks [s]
+ENDING = 60.0  # for a scenario that is interrupted [s]
 STOPPED = 60.0, 68.0  # when a stranger is, longer than publishers keep samples for a reader [s]
 
 
@@ -138,15 +139,28 @@ def fly(asked: argparse.Namespace, out: Path, limits: Path) -> dict[str, list[Lo
     with load(idle=asked.idle) as strangers:
         scenario = subprocess.Popen(command, start_new_session=True)
         begin = time.monotonic()
-        while scenario.poll() is None:
-            stopped = STOPPED[0] <= time.monotonic() - begin < STOPPED[1]
-            for stranger in strangers[:1]:
-                stranger.send_signal(signal.SIGSTOP if stopped else signal.SIGCONT)
-            for name, pid in nodes(scenario.pid).items():
-                if seen := look(pid):
-                    held.setdefault(name, []).append(seen)
-            time.sleep(PERIOD)
+        try:
+            while scenario.poll() is None:
+                stopped = STOPPED[0] <= time.monotonic() - begin < STOPPED[1]
+                for stranger in strangers[:1]:
+                    stranger.send_signal(signal.SIGSTOP if stopped else signal.SIGCONT)
+                for name, pid in nodes(scenario.pid).items():
+                    if seen := look(pid):
+                        held.setdefault(name, []).append(seen)
+                time.sleep(PERIOD)
+        finally:
+            land(scenario)
     return held
+
+
+def land(scenario: subprocess.Popen[bytes]) -> None:
+    """Land a scenario that still flies, and leave nothing of it."""
+    scenario.send_signal(signal.SIGINT)
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        scenario.wait(ENDING)
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(scenario.pid, signal.SIGKILL)
+    scenario.wait()
 
 
 def growth(held: list[Look]) -> tuple[float, int]:
