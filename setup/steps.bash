@@ -114,8 +114,8 @@ explain() { # TITLE OUTPUT
 # pip of the environment, untouched by the caller's own pip targets and python path. Most modules
 # are never used: those that are, are compiled when they are (see warm_up).
 pip_install() {
-  env -u PYTHONPATH -u PYTHONHOME -u PIP_TARGET -u PIP_PREFIX -u PIP_USER \
-    -u PIP_REQUIRE_VIRTUALENV PIP_DISABLE_PIP_VERSION_CHECK=1 \
+  env -u PYTHONPATH -u PYTHONHOME -u PIP_TARGET -u PIP_PREFIX -u PIP_REQUIRE_VIRTUALENV \
+    PIP_USER=0 PIP_DISABLE_PIP_VERSION_CHECK=1 \
     _ROS_WHEELS_BOOTSTRAP_COMPLETE=1 PYTHONNOUSERSITE=1 \
     bash -c "${ros_setup:+. $ros_setup; } exec \"\$@\"" - \
     "$venv/bin/python" -m pip install --no-input --no-compile --progress-bar off \
