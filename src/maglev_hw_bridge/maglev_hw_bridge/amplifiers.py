@@ -122,6 +122,7 @@ class Amplifiers:
     def __init__(self, parameters: BridgeParameters) -> None:
         amplifier, commutation = parameters.amplifier, parameters.commutation
         self._warn_load = amplifier.warn_load
+        self._thermal_time = amplifier.thermal_time
         self.arrays = AmplifierArrays(
             wave=math.pi / parameters.machine.pole_pitch,
             scale=SCALES[commutation.dq_scaling],
@@ -165,6 +166,16 @@ class Amplifiers:
     def load(self) -> float:
         """I²t load of the hottest phase."""
         return float(np.max(self.arrays.load))
+
+    def cool(self, time: float) -> None:
+        """Let them be without current for a time [s]."""
+        self.arrays.load[:] *= math.exp(-time / self._thermal_time)
+
+    @property
+    def cooling_time(self) -> float:
+        """For how long they have to cool before current may flow [s]; 0 where it may now."""
+        hot, limit = self.load, self.arrays.derate
+        return self._thermal_time * math.log(hot / limit) if hot > limit else 0.0
 
     @property
     def warm(self) -> bool:

@@ -111,15 +111,14 @@ class Commissioning:
     def _cool(self) -> None:
         """What the amplifiers have cooled since current flowed, or since this was asked last."""
         now = time.monotonic()
-        passed, self._cooling_since = now - self._cooling_since, now
-        self._amplifiers.arrays.load[:] *= np.exp(-passed / self._parameters.amplifier.thermal_time)
+        self._amplifiers.cool(now - self._cooling_since)
+        self._cooling_since = now
 
     def _let_cool(self) -> None:
         """Wait until they are no hotter than a bridge may be activated with."""
         self._cool()
-        amplifier, load = self._parameters.amplifier, self._amplifiers.load
-        if load > amplifier.derate_load:
-            wait = amplifier.thermal_time * float(np.log(load / amplifier.derate_load))
+        load, wait = self._amplifiers.load, self._amplifiers.cooling_time
+        if wait > 0.0:
             self._tell(f'  the amplifiers are hot, I2t load {load:.2f}: they cool for {wait:.1f} s')
             time.sleep(wait)
             self._cool()

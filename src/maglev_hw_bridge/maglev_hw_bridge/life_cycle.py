@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import abc
 import contextlib
-import math
 import time
 from typing import Any
 
@@ -226,19 +225,16 @@ class StageLife(abc.ABC):
         beyond = self.encoders.homed and self.encoders.beyond_stops()
         if beyond:
             return f'{beyond}: home first (~/home)'
-        hot, limit = self.amplifiers.load, self.parameters.amplifier.derate_load
-        if hot > limit:
-            wait = self.parameters.amplifier.thermal_time * math.log(hot / limit)
+        hot, wait = self.amplifiers.load, self.amplifiers.cooling_time
+        if wait > 0.0:
             return f'the amplifiers are hot, I2t load {hot:.2f}: let them cool for {wait:.1f} s'
         return ''
 
     def _cool(self) -> None:
         """What the amplifiers have cooled while no sample was taken."""
         now = time.monotonic()
-        passed = now - self._cooling_since
+        self.amplifiers.cool(now - self._cooling_since)
         self._cooling_since = now
-        thermal_time = self.parameters.amplifier.thermal_time
-        self.amplifiers.arrays.load[:] *= math.exp(-passed / thermal_time)
 
     def deactivate(self) -> None:
         """Disable the amplifiers and the watchdog; :meth:`land` first.
@@ -281,7 +277,8 @@ class StageLife(abc.ABC):
             self.fault, self.why = fault, kind
         elif str(error) not in before.reason:
             self.fault = faults.then(before, fault)
-            self.why = kind if landing else self.why
+            if landing:
+                self.why = kind
         return StageError(str(error))
 
     # -- coming back -------------------------------------------------------------------------------
