@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
 import pytest
 
+from maglev_model.axes import AXES
 from maglev_model.modes import Mode
 from maglev_model.parameters import build
 from maglev_model.phases import Phase
 from maglev_reference.check import UnreachableError
 from maglev_reference.given_points import Candidate, Point, Through, step
+from maglev_reference.motion import Quintic, State
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.run import ReferenceRun
 
@@ -73,6 +76,32 @@ def test_accelerations_are_met_and_a_first_point_may_be_the_hover() -> None:
     assert before.acceleration[0, 1] == pytest.approx(0.1, abs=1e-5)
 
 
+def test_each_piece_of_many_is_the_quintic_between_its_ends() -> None:
+    rng = np.random.default_rng(5)
+    states = [State.at_rest(HOVER)]
+    states += [State(*(HOVER + 1e-3 * rng.normal(size=5) for _ in range(3))) for _ in range(40)]
+    states += [State.at_rest(HOVER)]
+    times = np.concatenate(([0.0], np.cumsum(rng.uniform(0.01, 0.3, len(states) - 1))))
+    points = [Point(t, *map(tuple, state)) for t, state in zip(times, states, strict=True)]
+    motion = through(*points, names=AXES)
+    for number, pair in enumerate(itertools.pairwise(states)):
+        length = times[number + 1] - times[number]
+        alone = np.linspace(0.0, length, 7)[:-1]
+        piece = Quintic(*pair, length).evaluate(alone)
+        for whole, part in zip(motion.evaluate(times[number] + alone), piece, strict=True):
+            np.testing.assert_allclose(whole, part, rtol=1e-9, atol=1e-9)
+
+
+def test_a_first_point_at_the_hover_changes_nothing() -> None:
+    """Its velocities are 0 and its accelerations, which no one gives, are too."""
+    rest = Point(0.4, (0.001,), (0.0,))
+    with_it, alone = through(Point(0.0, (5e-7,), (0.0,)), rest), through(rest)
+    for one, other in zip(
+        *(m.evaluate(np.linspace(0.0, 0.5, 11)) for m in (with_it, alone)), strict=True
+    ):
+        np.testing.assert_array_equal(one, other)
+
+
 @pytest.mark.parametrize(
     ('names', 'points', 'why'),
     [
@@ -84,6 +113,8 @@ def test_accelerations_are_met_and_a_first_point_may_be_the_hover() -> None:
         (('x',), (Point(0.5, (0.0,), (0.0, 0.0)),), 'has 2 values of velocity for 1 axes'),
         (('x',), (Point(0.5, (math.nan,)),), r'position of x is nan at 0\.5 s'),
         (('x',), (Point(math.nan, (0.0,)),), 'point 1 is at nan s'),
+        (('x',), (Point(0.0, (0.0,)), *STEP, *STEP), r'point 3 is at 0\.5 s, .* after 0\.5 s'),
+        (('x',), (Point(0.0, (0.0,)), Point(0.0, (0.0,))), r'point 2 is at 0 s, .* after 0 s'),
         (('x',), (*STEP, Point(0.5, (0.0,))), r'point 2 is at 0\.5 s, it must come after 0\.5 s'),
         (('x',), (Point(0.0, (0.001,)), *STEP), r'x is 0\.001 m at 0 s, .* hovers, at 0 m'),
         (('x',), (Point(0.0, (0.0,)),), 'no point after its start'),

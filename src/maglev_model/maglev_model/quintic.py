@@ -64,11 +64,12 @@ def quintic_to_zero(
 def quintic_coefficients(
     start: tuple[FloatArray, FloatArray, FloatArray],
     end: tuple[FloatArray, FloatArray, FloatArray],
-    duration: float,
+    duration: float | FloatArray,
 ) -> FloatArray:
     """c_0 to c_5, shape (6, n), of the quintics from one state to another in ``duration`` [s].
 
-    A state is position, velocity and acceleration, shape (n,) each.
+    A state is position, velocity and acceleration, shape (n,) each. Where they are (m, n), and
+    ``duration`` (m, 1), those of m transitions, shape (6, m, n).
     """
     v_0, v_1 = start[1] * duration, end[1] * duration
     a_0, a_1 = start[2] * duration**2, end[2] * duration**2
@@ -77,13 +78,15 @@ def quintic_coefficients(
 
 
 def evaluate_quintic(
-    coefficients: FloatArray, duration: float, elapsed: FloatArray
+    coefficients: FloatArray, duration: float | FloatArray, elapsed: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Position, velocity, acceleration, (m, n) each, at times (m,) [s], held at 0 and at the end.
 
-    ``coefficients`` (6, n) are those of :func:`quintic_coefficients` for ``duration`` [s].
+    ``coefficients`` (6, n) are those of :func:`quintic_coefficients` for ``duration`` [s]; or
+    (6, m, n) and (m,), one transition for each time.
     """
     s = np.clip(elapsed / duration, 0.0, 1.0)[:, None]
+    duration = np.reshape(duration, (-1, 1))
     c_0, c_1, c_2, c_3, c_4, c_5 = coefficients
     position, velocity, acceleration = _evaluate(c_0, c_1, c_2, c_3, c_4, c_5, s)
     velocity /= duration

@@ -5,17 +5,17 @@ It is checked like any other reference, but a piece at a time, because meanwhile
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from maglev_model.axes import AXES, UNITS, FloatArray
-from maglev_model.quintic import minimum_jerk_time
+from maglev_model.quintic import evaluate_quintic, minimum_jerk_time, quintic_coefficients
 from maglev_reference.check import UnreachableError, check_locked, check_samples
 from maglev_reference.currents import check_currents
-from maglev_reference.motion import Kinematics, Quintic, State
+from maglev_reference.motion import Kinematics, State
 from maglev_reference.parameters import ReferenceParameters
 
 _PIECE = 1000  # samples checked together, a few milliseconds
@@ -44,29 +44,26 @@ class Through:
         columns = _columns(names)
         if not points:
             raise UnreachableError('the trajectory has no points')
-        knots = [(0.0, State.at_rest(hover), True)]
-        for number, point in enumerate(points, start=1):
-            knot = _state(point, columns, hover, number)
-            if point.time <= knots[-1][0]:
-                _check_order(number, point.time, knots[-1][0], knot, hover)
-                continue
-            knots.append((point.time, knot, bool(point.acceleration or not point.velocity)))
-        if len(knots) == 1:
+        knots = _knots(points, columns, hover)
+        if len(knots.time) == 1:
             raise UnreachableError('the trajectory has no point after its start')
-        _check_end(knots[-1][1], knots[-1][0])
-        self._starts = np.array([time for time, _, _ in knots[:-1]])
-        self._moves = [_move(*pair) for pair in itertools.pairwise(knots)]
-        self.length = knots[-1][0]
+        _check_end(State(*(values[-1] for values in knots.state)), knots.time[-1])
+        self._end = knots.state.position[-1]
+        self._starts, self._durations = knots.time[:-1], np.diff(knots.time)
+        self._coefficients = _coefficients(knots)
+        self.length = float(knots.time[-1])
 
     def evaluate(self, time: FloatArray) -> Kinematics:
         """Position, velocity and acceleration at each time (n,) [s]."""
-        found = Kinematics(*(np.empty((len(time), 5)) for _ in range(3)))
         which = np.maximum(np.searchsorted(self._starts, time, side='right') - 1, 0)
-        for index in np.unique(which):
-            rows = which == index
-            moved = self._moves[index].evaluate(time[rows] - self._starts[index])
-            for values, part in zip(found, moved, strict=True):
-                values[rows] = part
+        found = Kinematics(
+            *evaluate_quintic(
+                self._coefficients[:, which], self._durations[which], time - self._starts[which]
+            )
+        )
+        found.position[time >= self.length] = self._end
+        found.velocity[time >= self.length] = 0.0
+        found.acceleration[time > self.length] = 0.0  # a cubic arrives with some
         return found
 
 
@@ -96,48 +93,81 @@ def _columns(names: Sequence[str]) -> list[int]:
     return [AXES.index(name) for name in names]
 
 
-def _state(point: Point, columns: list[int], hover: FloatArray, number: int) -> State:
-    state = State.at_rest(hover)
-    if not np.isfinite(point.time) or point.time < 0.0:
-        raise UnreachableError(f'point {number} is at {point.time:g} s')
-    for values, given, name in zip(
-        state, (point.position, point.velocity, point.acceleration), Point._fields[1:], strict=True
-    ):
-        if len(given) != len(columns) and (len(given) or name == 'position'):
-            raise UnreachableError(
-                f'point {number}, at {point.time:g} s, has {len(given)} values of {name} for '
-                f'{len(columns)} axes'
-            )
-        for axis, value in zip(columns, given, strict=False):
-            if not np.isfinite(value):
-                raise UnreachableError(
-                    f'{name} of {AXES[axis]} is {value} at {point.time:g} s, it must be finite'
-                )
-            values[axis] = value
-    return state
+class _Knots(NamedTuple):
+    """Where a motion passes at ``time`` (n,) [s]; and whether its acceleration (n,) is known."""
+
+    time: FloatArray
+    state: Kinematics
+    known: NDArray[np.bool_]
 
 
-def _check_order(number: int, time: float, before: float, knot: State, hover: FloatArray) -> None:
-    """A point that does not come later is none, unless it is the hover itself, at time 0."""
-    if number > 1 or time != 0.0:
+def _knots(points: Sequence[Point], columns: list[int], hover: FloatArray) -> _Knots:
+    """The hover and the points after it."""
+    given = np.array([point.time for point in points])
+    for number in np.flatnonzero(~(np.isfinite(given) & (given >= 0.0))):
+        raise UnreachableError(f'point {number + 1} is at {given[number]:g} s')
+    begun = int(given[0] == 0.0)  # with the hover itself
+    time = np.concatenate((np.zeros(1 - begun), given))
+    state = Kinematics(np.tile(hover, (len(time), 1)), *np.zeros((2, len(time), 5)))
+    known = np.ones(len(time), dtype=np.bool_)
+    for values, name in zip(state, Point._fields[1:], strict=True):
+        rows, there = _values(points, name, columns)
+        values[1 - begun :, columns] = rows
+        if name == 'velocity':
+            known[1 - begun :] = ~there
+        elif name == 'acceleration':
+            known[1 - begun :] |= there
+    if begun:
+        _check_start(State(*(values[0] for values in state)), hover)
+        state.position[0], known[0] = hover, True
+    for number in np.flatnonzero(np.diff(time) <= 0.0):
         raise UnreachableError(
-            f'point {number} is at {time:g} s, it must come after {before:g} s, the one before'
+            f'point {number + 1 + begun} is at {time[number + 1]:g} s, '
+            f'it must come after {time[number]:g} s, the one before'
         )
-    away = np.abs(knot.position - hover)
+    return _Knots(time, state, known)
+
+
+def _values(
+    points: Sequence[Point], name: str, columns: list[int]
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """What points name a value for (n, axes), else 0, and which do (n,)."""
+    rows = [getattr(point, name) for point in points]
+    sizes = np.array([len(row) for row in rows])
+    there = sizes > 0
+    for number in np.flatnonzero((sizes != len(columns)) & (there | (name == 'position'))):
+        raise UnreachableError(
+            f'point {number + 1}, at {points[int(number)].time:g} s, has {sizes[number]} values of '
+            f'{name} for {len(columns)} axes'
+        )
+    values = np.zeros((len(points), len(columns)))
+    if there.any():
+        values[there] = [row for row in rows if len(row)]
+    for number, column in np.argwhere(~np.isfinite(values)):
+        raise UnreachableError(
+            f'{name} of {AXES[columns[column]]} is {values[number, column]} at '
+            f'{points[int(number)].time:g} s, it must be finite'
+        )
+    return values, there
+
+
+def _check_start(state: State, hover: FloatArray) -> None:
+    """A first point at time 0 is the hover itself."""
+    away = np.abs(state.position - hover)
     axis = int(np.argmax(away))
     if away[axis] > _HERE:
         raise UnreachableError(
-            f'{AXES[axis]} is {knot.position[axis]:.6g} {UNITS[axis]} at 0 s, it must begin where '
+            f'{AXES[axis]} is {state.position[axis]:.6g} {UNITS[axis]} at 0 s, it must begin where '
             f'the reference hovers, at {hover[axis]:.6g} {UNITS[axis]}'
         )
-    for values, name in ((knot.velocity, 'velocity'), (knot.acceleration, 'acceleration')):
+    for values, name in zip(state[1:], State._fields[1:], strict=True):
         if values.any():
             axis = int(np.argmax(np.abs(values)))
             raise UnreachableError(f'{name} of {AXES[axis]} is {values[axis]:g} at 0 s, not 0')
 
 
 def _check_end(state: State, time: float) -> None:
-    for values, name in ((state.velocity, 'velocity'), (state.acceleration, 'acceleration')):
+    for values, name in zip(state[1:], State._fields[1:], strict=True):
         if values.any():
             axis = int(np.argmax(np.abs(values)))
             raise UnreachableError(
@@ -145,20 +175,16 @@ def _check_end(state: State, time: float) -> None:
             )
 
 
-def _move(before: tuple[float, State, bool], after: tuple[float, State, bool]) -> Quintic:
-    """The quintic between two points; where accelerations are not given, the cubic."""
-    (start, one, known), (end, two, also_known) = before, after
-    time = end - start
-    way = (two.position - one.position) / time
-    if not known:
-        one = one._replace(
-            acceleration=(6.0 * way - 4.0 * one.velocity - 2.0 * two.velocity) / time
-        )
-    if not also_known:
-        two = two._replace(
-            acceleration=(2.0 * one.velocity + 4.0 * two.velocity - 6.0 * way) / time
-        )
-    return Quintic(one, two, time)
+def _coefficients(knots: _Knots) -> FloatArray:
+    """Quintics (6, n - 1, 5) between knots; where accelerations are not known, cubics."""
+    time = np.diff(knots.time)[:, None]
+    before, after = ([values[part] for values in knots.state] for part in (np.s_[:-1], np.s_[1:]))
+    way = (after[0] - before[0]) / time
+    leaving = (6.0 * way - 4.0 * before[1] - 2.0 * after[1]) / time
+    arriving = (2.0 * before[1] + 4.0 * after[1] - 6.0 * way) / time
+    before[2] = np.where(knots.known[:-1, None], before[2], leaving)
+    after[2] = np.where(knots.known[1:, None], after[2], arriving)
+    return quintic_coefficients(State(*before), State(*after), time)
 
 
 class Candidate:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.serialization import deserialize_message
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
@@ -40,6 +41,7 @@ from maglev_reference.run import ReferenceRun
 from maglev_reference.timeline import Timeline
 
 _LOOK_PERIOD = 0.25  # between two looks at the graph while the stage is flown [s]
+_LONGEST_TRAJECTORY = 100_000  # [bytes], which are read in less time than is published ahead
 _REMINDER = 5.0  # between two lines about what is waited for [s]
 _IDLE_PERIOD = 0.02  # from one sample to the next while nothing shall move, in lockstep [s]
 _PLANNED = ('phase', 'segment', 'position', 'velocity', 'acceleration', 'target')
@@ -114,7 +116,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         self._lockstep = self.parameters.mode == 'lockstep'
         self._measured: Any = None
         self._published = 0.0  # when, last
-        self.create_subscription(JointTrajectory, '~/trajectory', self._on_trajectory, 1)
+        self.create_subscription(JointTrajectory, '~/trajectory', self._on_trajectory, 1, raw=True)
         self.create_service(Trigger, '~/lift_off', self._lift_off)
         self.create_service(Trigger, '~/land', self._land)
         self.create_service(Step, '~/step', self._step)
@@ -283,9 +285,15 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
             who = 'the stage is gone'
         self.fail(f'no measurement for {silent:.1f} s after sample {self._run.newest}: {who}')
 
-    def _on_trajectory(self, message: JointTrajectory) -> None:
+    def _on_trajectory(self, data: bytes) -> None:
         """Take a trajectory in; it is checked in pieces, between which the hover goes on."""
         try:
+            if len(data) > _LONGEST_TRAJECTORY:
+                raise UnreachableError(
+                    f'the message has {len(data)} bytes, it must have at most '
+                    f'{_LONGEST_TRAJECTORY}: give fewer points, they are joined by quintics'
+                )
+            message = deserialize_message(data, JointTrajectory)
             if message.header.stamp.sec or message.header.stamp.nanosec:
                 raise UnreachableError('header.stamp must be 0: it starts at once')
             self._run.propose(message.joint_names, [_point(each) for each in message.points])
