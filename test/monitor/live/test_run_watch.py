@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import numpy as np
@@ -88,6 +89,47 @@ def test_a_run_that_does_not_begin_or_falls_silent_is_given_up(messages: Message
     assert 'STEP' in watch.line(6.0) or 'HOLD' in watch.line(6.0)
     assert watch.given_up(ALL, 7.9) == ''
     assert watch.given_up(ALL, 8.1).startswith('the run has stopped: the ')
+
+
+def test_a_stage_that_begins_anew_before_the_run_is_waited_for_from_there(
+    run: Any, encoder: Any, messages: Messages
+) -> None:
+    resting = dataclasses.replace(run, phase=np.full_like(run.phase, Phase.REST))
+    numbers = range(len(run.phase))
+    before = {key: [encoder.message(resting, key, n) for n in numbers] for key in messages}
+    watch = RunWatch(PARAMETERS, SOMEBODY, 0.0)
+    watch.add(before)
+    assert not watch.started
+    watch.add(part(before, 0, 30))
+    assert watch.given_up(ALL | {'measurement': 2}, 0.9) == ''  # the other may leave again
+    assert watch.given_up(ALL, 1.0) == ''
+    watch.add(messages)
+    assert watch.over(2.0)
+    result = watch.conclude()
+    assert (result['verdict'], result['missing_samples'], watch.dropped) == ('pass', 0, 0)
+
+
+def test_a_stage_that_begins_anew_ends_the_run(messages: Messages) -> None:
+    watch = RunWatch(PARAMETERS, SOMEBODY, 0.0)
+    watch.add(part(messages, 0, 700))
+    assert watch.given_up(ALL, 1.0) == ''
+    again = part(messages, 0, 30)
+    watch.add(again | {'measurement': messages['measurement'][695:700] + again['measurement']})
+    said = watch.given_up(ALL, 2.0)
+    assert said == 'the run has stopped: the stage began anew after sample 699'
+    assert watch.conclude()['verdict'] == 'incomplete'
+
+
+def test_what_a_second_stage_measures_while_it_looks_around_is_left_out(
+    messages: Messages,
+) -> None:
+    watch = RunWatch(PARAMETERS, SOMEBODY, 0.0)
+    watch.add(part(messages, 0, 700))
+    watch.add({'measurement': messages['measurement'][:20]})
+    watch.add(part(messages, 700, 1500))
+    assert watch.given_up(ALL, 2.0) == ''
+    assert watch.conclude()['verdict'] == 'pass'
+    assert watch.dropped == 0
 
 
 def test_nobody_is_said_not_to_run_whom_nobody_has_seen() -> None:

@@ -10,12 +10,14 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from maglev_model.parameters import parameter
 from maglev_model.wire import DecodeError
 from maglev_monitor.live.discovery import DiscoveryWatch
 from maglev_monitor.live.progress import Progress
 from maglev_monitor.live.silence import SilenceWatch
-from maglev_monitor.metrics.decoding import decode
+from maglev_monitor.metrics.decoding import Records, decode
 from maglev_monitor.metrics.joiner import Joiner
 from maglev_monitor.metrics.run_metrics import RunMetrics
 from maglev_monitor.metrics.run_parameters import RunParameters
@@ -44,14 +46,18 @@ class RunWatch:
     def __init__(self, parameters: WatchParameters, discovery: DiscoveryWatch, now: float) -> None:
         self._parameters = parameters
         self._discovery = discovery
-        self._joiner = Joiner()
-        self._metrics = RunMetrics(parameters)
-        self._progress = Progress(parameters)
-        self._silence = SilenceWatch(now)
         self._waiting_since = now
         self._conclude_at: float | None = None
         self.result: dict[str, Any] | None = None
         """The content of ``metrics.json``, once the run was concluded."""
+        self._begin(now)
+
+    def _begin(self, now: float) -> None:
+        self._joiner = Joiner()
+        self._metrics = RunMetrics(self._parameters)
+        self._progress = Progress(self._parameters)
+        self._silence = SilenceWatch(now)
+        self._last_measured = -1  # number of what came last, which need not be the newest
 
     @property
     def started(self) -> bool:
@@ -67,9 +73,16 @@ class RunWatch:
         """Take serialized messages by topic key. Raises DecodeError."""
         for key, part in messages.items():
             if part:
-                self._joiner.add(key, decode(key, part))
+                records = decode(key, part)
+                self._joiner.add(key, self._newer(records) if key == 'measurement' else records)
         for block in self._joiner.take():
             self._progress.add(self._metrics.add(block))
+
+    def _newer(self, measured: Records) -> Records:
+        """What one stage measures, which goes upwards: what does not is another's."""
+        sequence = measured['sequence'].astype(np.int64)
+        self._last_measured = int(sequence[-1])
+        return measured[sequence > self._joiner.newest['measurement']]
 
     def add_fault(self, stamp: int, node: str, message: str, now: float) -> bool:
         """Take an error a node reported at a time [ns]; whether it is the first of the run."""
@@ -107,9 +120,16 @@ class RunWatch:
     def given_up(self, publishers: Mapping[str, int], now: float) -> str:
         """Why there is nothing left to wait for, empty while there is.
 
+        A stage that begins anew ends a run; before there is one, it is waited for from there.
+
         :param publishers: how many publish each topic, by key.
         """
         waited = now - self._waiting_since
+        before = self._joiner.newest['measurement']
+        if self._last_measured < before and publishers['measurement'] == 1:
+            if self.started:
+                return f'the run has stopped: the stage began anew after sample {before}'
+            self._begin(now)
         if self.started:
             if self._silence.longest(now).duration > self._parameters.timeout:
                 return f'the run has stopped: {self._silence.blame(publishers, now)}'
