@@ -25,13 +25,15 @@ class SamplePublisher:
     """The measurement of each sample and, with ``truth``, the true state it was taken from.
 
     Stamps are stage time: the wall clock at the first sample since :meth:`start`, plus
-    ``sample_time`` [s] for each further one. In lockstep ``clock`` tells it to the graph.
+    ``sample_time`` [s] for each further one. It never goes back, also where it was ahead of the
+    wall clock, as in lockstep. There ``clock`` tells it to the graph.
     """
 
     def __init__(self, node: MaglevNode[P], sample_time: float, *, truth: bool) -> None:
         self._node = node
         self._period = round(1e9 * sample_time)  # [ns]
         self._first: tuple[int, int] | None = None  # sample, and its time [ns]
+        self._newest = 0  # stamp of what was published last [ns]
         lockstep = node.parameters.mode == 'lockstep'
         qos = sample_qos(KEPT[node.parameters.mode])
         self._measurement = SampleWriter(node, MEASUREMENT, qos)
@@ -63,8 +65,8 @@ class SamplePublisher:
         """Publish one sample; ``controller`` is the session of the one whose currents flow."""
         message, wall_time = self._measurement, time.time_ns()
         if self._first is None:
-            self._first = sequence, wall_time
-        stamp = self.stage_time(sequence)
+            self._first = sequence, max(wall_time, self._newest + self._period)
+        self._newest = stamp = self.stage_time(sequence)
         message.set_stamp(stamp)
         message['sequence'], message['wall_time'] = sequence, wall_time
         message['gap'], message['x'], message['z'] = sample
