@@ -6,7 +6,7 @@ import contextlib
 import socket
 import time
 from collections.abc import Callable, Iterable
-from typing import Any, Self
+from typing import Any
 
 import msgspec
 import viser
@@ -39,7 +39,7 @@ class PageClient:
         self.messages: list[dict[str, Any]] = []
         self.send(self._camera())
 
-    def __enter__(self) -> Self:
+    def __enter__(self) -> PageClient:
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -12,7 +12,6 @@ import subprocess
 import sys
 import threading
 import time
-from typing import Self
 
 from maglev_node.realtime import take_priority
 
@@ -30,15 +29,16 @@ class Witness:
     def __init__(self) -> None:
         self.worst = self.share = 0.0
 
-    def __enter__(self) -> Self:
+    def __enter__(self) -> Witness:
         self._process = subprocess.Popen(
             [sys.executable, __file__], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
+        assert self._process.stdout is not None
         assert self._process.stdout.readline() == 'watching\n'
         return self
 
     def __exit__(self, *_: object) -> None:
-        said, _ = self._process.communicate()  # the end of its input ends it
+        said = self._process.communicate()[0]  # the end of its input ends it
         self.worst, self.share = json.loads(said)
 
     @property
