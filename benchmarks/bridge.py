@@ -12,7 +12,6 @@ import argparse
 import gc
 import sys
 import time
-from typing import Any
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from maglev_hw_bridge.drivers.quanser import QuanserDriver
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.stage import BridgeStage, Mode
 from maglev_model.parameters import build
+from maglev_model.stage import Stage
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
 
@@ -55,7 +55,7 @@ def bridge() -> tuple[BridgeStage, UncountedBoards]:
     return stage, boards
 
 
-def samples(stage: Any, number: int, boards: UncountedBoards | None = None) -> np.ndarray:
+def samples(stage: Stage, number: int, boards: UncountedBoards | None = None) -> np.ndarray:
     """Processor time of each sample [µs]: read and write, less what the boards' machine takes.
 
     Between the two the default law answers, which does not count either.

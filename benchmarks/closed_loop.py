@@ -12,6 +12,7 @@ import contextlib
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -79,7 +80,7 @@ def in_turn(references: References, library: LoopInC, times: int) -> dict[str, f
 
     Short runs: of these some are disturbed by nothing, also on a machine that does other work.
     """
-    runs = {
+    runs: dict[str, Callable[[], float]] = {
         OURS: lambda: compiled_loop(references)[0],
         IN_C: lambda: loop_in_c(library, references)[0],
     }

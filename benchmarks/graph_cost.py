@@ -5,7 +5,7 @@ Runs bare echoes between two rclpy processes, the graph's messages without what 
 turn, so that a drifting machine drifts for all, and prints the ratio of the median tick to the
 other medians round by round. Use it with the environment of ``setup.sh``::
 
-    source setup.sh && python benchmarks/graph.py
+    source setup.sh && python benchmarks/graph_cost.py
 """
 
 from __future__ import annotations

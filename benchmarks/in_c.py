@@ -83,7 +83,9 @@ class LoopInC:
         control = regulator.arrays
         arrays = [stage.arrays.block, *control, *(np.ascontiguousarray(one) for one in references)]
         arrays += [state, reading, own, current]
-        pointers = [ctypes.c_void_p(one.ctypes.data) for one in arrays]
+        pointers: list[ctypes.c_void_p | ctypes.c_int] = [
+            ctypes.c_void_p(one.ctypes.data) for one in arrays
+        ]
         pointers.insert(5, ctypes.c_int(control.xi.shape[1]))
         done = self._function(ctypes.c_int(n), *pointers)
         if done < n:

@@ -76,7 +76,7 @@ def possible(machine: Machine, output: FloatArray, wanted: FloatArray) -> bool:
         if low > high:
             return False
         least, most = least + low, most + high
-    return max(least, LEAST * machine.M_y * machine.G) <= total <= most
+    return bool(max(least, LEAST * machine.M_y * machine.G) <= total <= most)
 
 
 def least_time(start: FloatArray, target: FloatArray, parameters: ReferenceParameters) -> float:

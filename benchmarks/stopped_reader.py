@@ -9,6 +9,7 @@ the median time of a publish [us] second by second. ``stopped_reader.py [SECONDS
 
 from __future__ import annotations
 
+import argparse
 import itertools
 import statistics
 import subprocess
@@ -42,17 +43,21 @@ def publish(depth: int, seconds: int) -> None:
 
 
 def main() -> None:
-    """All of them, or one."""
-    match sys.argv[1:]:
-        case [depth, heap, seconds]:
-            if heap == 'kept':
-                keep_heap()
-            publish(int(depth), int(seconds))
-        case given:
-            seconds = given[0] if given else '18'
-            for depth, heap in itertools.product(sorted(set(KEPT.values())), ('as it is', 'kept')):
-                print(f'{depth:6d} samples, heap {heap:9s}', end='', flush=True)
-                subprocess.run([sys.executable, __file__, str(depth), heap, seconds], check=True)
+    """All of them, each in a process of its own, or one."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument('seconds', nargs='?', type=int, default=18, help='of each (default 18)')
+    parser.add_argument('--depth', type=int, help='of the only one')
+    parser.add_argument('--keep-heap', action='store_true', help='in the only one')
+    asked = parser.parse_args()
+    if asked.depth is not None:
+        if asked.keep_heap:
+            keep_heap()
+        publish(asked.depth, asked.seconds)
+        return
+    for depth, heap in itertools.product(sorted(set(KEPT.values())), ('as it is', 'kept')):
+        print(f'{depth:6d} samples, heap {heap:9s}', end='', flush=True)
+        command = [sys.executable, __file__, str(asked.seconds), '--depth', str(depth)]
+        subprocess.run(command + ['--keep-heap'] * (heap == 'kept'), check=True)
 
 
 if __name__ == '__main__':

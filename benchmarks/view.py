@@ -17,7 +17,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from graph import Watch, scenario
+from graph_cost import Watch, scenario
 
 WATCHER = """
 import rclpy

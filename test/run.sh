@@ -77,7 +77,7 @@ check_style() {
   local failed=0
   ruff check . || failed=1
   ruff format --check . || failed=1
-  mypy src/*/maglev_*/ scenarios/ || failed=1
+  mypy src/*/maglev_*/ scenarios/ benchmarks/ || failed=1
   return "$failed"
 }
 

@@ -35,13 +35,11 @@ def starts(
 ) -> tuple[Callable[[], Process], ...]:
     """What starts plant, controller and reference on the ellipse; ``arguments`` are the last's."""
     common = f'mode:={mode}', *watched
+    on_the_ellipse = *common, 'run_in:=1.0', *BRISK
     return (
         partial(nodes.start, 'plant', *common, *plant, params=('benchmark.yaml',)),
         partial(nodes.start, 'controller', *common, *SWIFT, *controller),
-        partial(
-            *(nodes.start, 'reference', *common, 'run_in:=1.0', *BRISK, *arguments),
-            params=(ELLIPSE,),
-        ),
+        partial(nodes.start, 'reference', *on_the_ellipse, *arguments, params=(ELLIPSE,)),
     )
 
 
@@ -61,7 +59,7 @@ def idles(observer: Observer) -> bool:
     """Whether the loop goes on, and takes no more samples than it must while nothing shall move."""
     first, begun = observer.newest(MEASUREMENT).sequence, time.monotonic()
     observer.serve(2.0)
-    rate = (observer.newest(MEASUREMENT).sequence - first) / (time.monotonic() - begun)
+    rate: float = (observer.newest(MEASUREMENT).sequence - first) / (time.monotonic() - begun)
     return 5.0 < rate < 80.0
 
 
