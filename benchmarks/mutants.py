@@ -47,7 +47,7 @@ _BRIDGE = (
     *bridge_tests('observer', 'board', 'way_down', 'unseen', 'rough_rig', 'amplifiers', 'guard'),
     *bridge_tests('knock', 'resting', 'life_cycle', 'memory', 'landing'),
     'test/model/test_stage_contract.py',
-    *bridge_tests('faults', 'sensing', 'driver_calls', 'boards_that_fail'),
+    *bridge_tests('faults', 'sensing', 'driver_calls', 'lines_and_offsets', 'boards_that_fail'),
     'test/study/faults/test_judge.py',
     *bridge_tests('controllers', 'commission'),
 )

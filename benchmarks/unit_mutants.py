@@ -68,10 +68,16 @@ FLYING: dict[str, tuple[str, ...]] = {
     'maglev_controller.supervision': (
         'test/controller/test_supervised_parts.py',
         'test/controller/test_supervision.py',
+        'test/controller/test_platen_does_not_follow.py',
         'test/controller/test_foreign_law.py',
+        'test/controller/test_foreign_law_in_flight.py',
     ),
-    'maglev_hw_bridge.board': bridge_tests('board', 'boards_that_fail', 'driver_calls'),
-    'maglev_hw_bridge.drivers.quanser': bridge_tests('driver_calls', 'boards_that_fail', 'board'),
+    'maglev_hw_bridge.board': bridge_tests(
+        'board', 'boards_that_fail', 'driver_calls', 'lines_and_offsets'
+    ),
+    'maglev_hw_bridge.drivers.quanser': bridge_tests(
+        'driver_calls', 'lines_and_offsets', 'boards_that_fail', 'board'
+    ),
     'maglev_hw_bridge.life_cycle': bridge_tests(
         'what_a_life_leaves', 'homing', 'life_cycle', 'memory'
     ),

@@ -1,4 +1,4 @@
-"""When the regulator acts: enabling, landing, and what becomes of a platen that does not follow."""
+"""When the regulator acts: enabling, landing, and every call in every state."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import functools
 
 import numpy as np
 import pytest
-from supervised import HOVER, QUICK, STANDING, STOP, lead
+from supervised import HOVER, QUICK, STANDING, STOP, Flight
 
 from maglev_controller.bumpless_transfer import model_maps
 from maglev_controller.parameters import ControllerParameters
@@ -22,21 +22,6 @@ from maglev_model.phases import Phase
 @pytest.fixture
 def supervisor() -> Supervisor:
     return Supervisor(build(ControllerParameters, STANDING))
-
-
-class Flight:
-    """Samples one after another, each with its reference."""
-
-    def __init__(self, supervisor: Supervisor) -> None:
-        self.supervisor = supervisor
-        self.sequence = -1
-
-    def step(
-        self, phase: Phase, wanted: np.ndarray, gap: float, x: float = 0.0, segment: int = 0
-    ) -> Mode:
-        """The mode after a sample with the platen level at ``gap`` and ``x``."""
-        self.sequence += 1
-        return lead(self.supervisor, self.sequence, phase, wanted, gap, x, segment)
 
 
 def test_an_enable_waits_for_the_next_lift_off(supervisor: Supervisor) -> None:
@@ -338,56 +323,6 @@ def test_what_cannot_change_in_flight_is_refused_also_when_it_took_off_meanwhile
     assert flying.parameters == _made().parameters
     supervisor.adopt(heavier, maps)
     assert supervisor.parameters.machine.mass_y == 7.5
-
-
-# -- a platen that does not follow -----------------------------------------------------------------
-
-
-def drifting(supervisor: Supervisor, axis: int, speed: float, samples: int) -> int:
-    """Hover at rest while the reference moves off; after how many samples it is given up."""
-    flight = Flight(supervisor)
-    flight.step(Phase.REST, STOP, 0.031)
-    velocity = speed * (np.arange(5) == axis)
-    references = supervisor.references
-    for n in range(1, samples + 1):
-        place = HOVER + 1e-3 * n * velocity
-        references.store(n, Phase.TRACK, 0, place, velocity, np.zeros(5))
-        supervisor.step(references.find(n), np.full(4, HOVER[0]), 0.0, 0.0)
-        if not supervisor.flying:
-            return n
-    return 0
-
-
-@pytest.mark.parametrize(('axis', 'most'), enumerate((1e-3, 2e-3, 2e-3, 3e-3, 3e-3)))
-def test_a_platen_that_does_not_follow_is_given_up_when_its_error_is_too_large(
-    axis: int, most: float
-) -> None:
-    supervisor = Supervisor(ControllerParameters())
-    given_up = drifting(supervisor, axis, 0.05, 100)
-    assert given_up == pytest.approx(most / 5e-5 + 1, abs=1)
-    assert supervisor.mode == Mode.FAULT
-    assert supervisor.status == Status.GAVE_UP
-    assert not supervisor.direct_current.any()
-    assert f'{["y", "x", "z", "phi", "theta"][axis]} is 0.00' in supervisor.reason
-    assert "'following.error'" in supervisor.reason
-
-
-def test_an_axis_that_nobody_controls_need_not_follow() -> None:
-    supervisor = Supervisor(build(ControllerParameters, {'theta.controlled': False}))
-    assert drifting(supervisor, 4, 0.05, 100) == 0
-
-
-def test_a_landing_that_does_not_follow_is_given_up_too() -> None:
-    supervisor = Supervisor(ControllerParameters())
-    flight = Flight(supervisor)
-    flight.step(Phase.REST, STOP, 0.031)
-    for _ in range(10):
-        flight.step(Phase.TRACK, HOVER, HOVER[0])
-    supervisor.disable()
-    modes = [flight.step(Phase.TRACK, HOVER, HOVER[0]) for _ in range(1500)]
-    assert set(modes) == {Mode.LANDING, Mode.FAULT}
-    assert supervisor.status == Status.GAVE_UP
-    assert 'y is 0.00' in supervisor.reason
 
 
 def test_why_it_does_not_regulate_is_told_from_the_beginning() -> None:

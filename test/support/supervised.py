@@ -35,3 +35,18 @@ def lead(
     references.store(sequence, phase, segment, wanted, np.zeros(5), np.zeros(5))
     supervisor.step(references.find(sequence), np.full(4, gap), x, 0.0)
     return supervisor.mode
+
+
+class Flight:
+    """Samples one after another, each with its reference."""
+
+    def __init__(self, supervisor: Supervisor) -> None:
+        self.supervisor = supervisor
+        self.sequence = -1
+
+    def step(
+        self, phase: Phase, wanted: np.ndarray, gap: float, x: float = 0.0, segment: int = 0
+    ) -> Mode:
+        """The mode after a sample with the platen level at ``gap`` and ``x``."""
+        self.sequence += 1
+        return lead(self.supervisor, self.sequence, phase, wanted, gap, x, segment)
