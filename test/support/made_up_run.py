@@ -16,6 +16,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from maglev_model.controller_watch import Status
 from maglev_model.phases import Phase
+from maglev_monitor.bag.reader import Bag
 from maglev_monitor.bag.writer import BagWriter
 
 FORMER = {
@@ -210,3 +211,13 @@ def write_samples(writer: BagWriter, run: Run, messages: dict[str, list[bytes]])
             part = slice(first, first + 40)
             stamps = run.stamp[part].tolist()
             writer.write(topic, zip(messages[key][part], stamps, strict=True))
+
+
+def read(path: Path) -> tuple[dict[str, int], list[str]]:
+    """Samples by topic key, and notes."""
+    bag = Bag(path)
+    counts: dict[str, int] = {}
+    for batch in bag.batches():
+        for key, records in batch.samples.items():
+            counts[key] = counts.get(key, 0) + len(records)
+    return counts, bag.notes
