@@ -3,109 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
 from made_up_node import MadeUpNode
+from made_up_stage import MadeUpStage, currents, start, start_realtime
 from rosgraph_msgs.msg import Clock
 
-from maglev_model.stage import EncoderSample, Fault, StageError, Truth
-from maglev_msgs.msg import Currents, Measurement, PlantState
+from maglev_model.stage import StageError
+from maglev_msgs.msg import Measurement, PlantState
 from maglev_node.sampling import Sampling
-from maglev_node.stamp import set_stamp
 from maglev_node.topics import KEPT, MEASUREMENT, TRUE_STATE
-
-ZERO = np.zeros(4)
-
-
-_TRUTH = Truth(np.arange(10.0), ZERO + 1.0, ZERO + 2.0, ZERO + 3.0, np.full(6, 4.0))
-
-
-class MadeUpStage:
-    """Notes its calls; flies from currents until it has been held ``endurance`` times."""
-
-    sample_time = 1e-3
-    late = 0.0
-
-    def __init__(self, *, real: bool = False, truth: bool = False) -> None:
-        self.paced = self.restartable = real
-        self.fault: Fault | None = None
-        self.flying = False
-        self.calls: list[str] = []
-        self.written: list[float] = []
-        self.ages: list[int] = []
-        self.failing = False
-        self.endurance = 3
-        self._truth = _TRUTH if truth else None
-
-    def _call(self, name: str) -> None:
-        self.calls.append(name)
-        if self.failing:
-            raise StageError('it is gone')
-
-    def configure(self) -> None:
-        self._call('configure')
-
-    def activate(self) -> None:
-        self._call('activate')
-
-    def read(self) -> EncoderSample:
-        self._call('read')
-        return EncoderSample(np.full(4, 0.031), 0.001, 0.002)
-
-    def write(self, direct_current: Any, quadrature_current: Any, age: int = 0) -> None:
-        self._call('write')
-        if not np.all(np.isfinite(direct_current)):
-            raise ValueError('a current is nan')
-        self.written.append(float(direct_current[0]))
-        self.ages.append(age)
-        self.flying = bool(np.any(direct_current)) and self.fault is None
-
-    def hold(self) -> None:
-        self._call('hold')
-        self.endurance -= 1
-        self.flying = self.flying and self.endurance > 0
-
-    def land(self, why: str) -> None:
-        self.calls.append(f'land: {why}')
-
-    def stop(self, why: str = 'emergency stop', kind: str = 'stop', remedy: str = '') -> None:
-        if self.fault is None:
-            self.fault = Fault(kind, why, remedy, not self.restartable)
-        self.flying = self.flying and self.restartable  # as the bridge, which lands
-
-    def reset(self) -> tuple[bool, str]:
-        cleared, self.fault = self.fault is not None or self.failing, None
-        self.failing = False
-        return cleared, 'cleared'
-
-    def deactivate(self) -> None:
-        self.calls.append('deactivate')
-
-    def close(self) -> None:
-        self._call('close')
-
-    def truth(self) -> Truth | None:
-        return self._truth
-
-
-def currents(sequence: int, current: float = 0.0, session: int = 1) -> Currents:
-    """What a controller sends for a sample, but for the stamp."""
-    status = Currents.FLYING if current else Currents.RESTING
-    return Currents(sequence=sequence, direct_current=[current] * 4, session=session, status=status)
-
-
-def start(stage: MadeUpStage, **parameters: Any) -> tuple[Any, MadeUpNode]:
-    node: Any = MadeUpNode(**parameters)
-    sampling = Sampling(node, stage)
-    sampling.start()
-    return sampling, node
-
-
-def start_realtime(stage: MadeUpStage, **parameters: Any) -> tuple[Any, MadeUpNode]:
-    return start(stage, mode='realtime', **parameters)
 
 
 def test_lockstep_repeats_the_first_sample_and_waits_for_each_answer() -> None:
@@ -204,30 +112,6 @@ def test_the_truth_goes_out_beside_the_measurement() -> None:
     assert PlantState not in start(MadeUpStage())[1].topics
 
 
-def test_currents_are_followed_from_zero_on_also_after_a_reset() -> None:
-    stage = MadeUpStage()
-    sampling, node = start(stage)
-    for sequence, current in enumerate((0.5, 0.5, 0.0, 0.7)):
-        node.answer(currents(sequence, current))
-    assert stage.written == [0.0, 0.7]
-    assert 'emergency stop' in sampling.emergency_stop()
-    assert sampling.reset()[0]
-    for sequence, current in enumerate((0.9, 0.0, 0.8), start=4):
-        node.answer(currents(sequence, current))
-    assert stage.written == [0.0, 0.7, 0.0, 0.8]
-
-
-def test_currents_that_a_stage_refuses_are_a_fault_said_once() -> None:
-    stage = MadeUpStage()
-    _, node = start(stage)
-    for sequence, current in enumerate((0.0, 0.5, float('nan'), float('nan'))):
-        node.answer(currents(sequence, current))
-    assert stage.fault is not None
-    assert stage.fault.reason == 'a current is nan'
-    assert len(node.errors) == 1
-    assert node.errors[0].startswith('fault at sample 2: a current is nan (currents cut)')
-
-
 @pytest.mark.parametrize('cause', ['a sample', 'a command'])
 def test_a_fault_is_said_after_the_output_that_answers_it(
     cause: str, monkeypatch: pytest.MonkeyPatch
@@ -302,127 +186,6 @@ def test_a_restartable_one_waits_for_a_reset() -> None:
     node.tick()  # waits for a controller again
     assert node.measured == [1, 2, 2]
     assert node.failed == []
-
-
-def test_real_time_takes_the_newest_currents_and_counts_missing_ones() -> None:
-    stage = MadeUpStage(real=True)
-    sampling, node = start_realtime(stage)
-    answers = ([], [1], [2], [], [], [3, 4, 5], [6])  # to the samples that tick after tick follow
-    for newest in answers:
-        node.inbox.messages = [currents(number, 0.1 * (number - 1)) for number in newest]
-        node.tick()
-    assert node.measured == [1, 2, 3, 4, 5, 6, 7]
-    assert stage.written == pytest.approx([0.0, 0.1, 0.4, 0.5])
-    assert stage.ages == [1, 1, 1, 1]
-    assert stage.calls[2:] == [
-        *('read', 'hold', 'read', 'write', 'read', 'write', 'read', 'hold', 'read', 'hold'),
-        *('read', 'write', 'read', 'write'),
-    ]
-    assert sampling.late_samples == 2  # at samples 4 and 5, with the currents for sample 2
-    assert node.timers[0].timer_period_ns > 0
-
-
-def test_the_age_of_currents_is_told_to_the_stage() -> None:
-    stage = MadeUpStage(real=True)
-    _, node = start_realtime(stage)
-    for answer in (0, 1, 2, 0, 3, 0, 4):
-        node.inbox.messages = [currents(answer, 0.1 * (answer - 1))] if answer else []
-        node.tick()
-    assert stage.ages == [1, 1, 2, 3]  # by their numbers, however regularly they come
-
-
-IN_FLIGHT: dict[str, tuple[Callable[[int], list[Currents]], str]] = {
-    'given up': (
-        lambda n: [Currents(sequence=n - 1, session=1, status=Currents.GAVE_UP)],
-        'the controller gave up',
-    ),
-    'somebody else': (lambda n: [currents(n, 0.5, session=2)], 'somebody else'),
-    'somebody else, who rests': (lambda n: [currents(n, session=2)], 'somebody else'),
-    'nobody': (lambda n: [currents(n, 0.5, session=0)], 'somebody else'),
-    'both': (lambda n: [currents(n, 0.5, session=2), currents(n, 0.5)], 'somebody else'),
-    'repeated': (lambda n: [currents(n - 1, 0.5)], 'after those for sample'),
-    'older': (lambda n: [currents(n - 2, 0.5)], 'after those for sample'),
-    'still to come': (lambda n: [currents(n + 2, 0.5)], 'still to come'),
-    'of another run': (
-        lambda n: [stamped_otherwise(currents(n, 0.5))],
-        'with the stamp of another measurement',
-    ),
-    'at rest, with currents': (
-        lambda n: [Currents(sequence=n, session=1, direct_current=[0.5] * 4)],
-        'says it rests',
-    ),
-    'in a state of its own': (
-        lambda n: [Currents(sequence=n, session=1, status=7, direct_current=[0.5] * 4)],
-        'with status 7',
-    ),
-}
-
-
-def stamped_otherwise(message: Currents) -> Currents:
-    set_stamp(message.header.stamp, 1_000_000_001)
-    return message
-
-
-@pytest.mark.parametrize('case', IN_FLIGHT)
-@pytest.mark.parametrize('mode', ['lockstep', 'realtime'])
-def test_what_no_controller_would_say_ends_a_flight(mode: str, case: str) -> None:
-    stage = MadeUpStage(real=True)
-    sampling, node = start(stage, mode=mode)
-
-    def say(messages: list[Currents]) -> None:
-        if mode == 'lockstep':
-            for message in messages:
-                node.answer(message)
-        else:
-            node.inbox.messages = messages
-            node.tick()
-
-    node.tick()
-    for current in (0.0, 0.5, 0.5):
-        say([currents(sampling.sequence, current)])
-    assert (stage.flying, sampling.late_samples, stage.fault) == (True, 0, None)
-    make, said = IN_FLIGHT[case]
-    say(make(sampling.sequence))
-    assert stage.fault is not None
-    assert stage.fault.kind == 'controller'
-    assert said in stage.fault.reason
-    assert stage.written == [0.0, 0.5, 0.5]
-    for _ in range(5):  # what flies on is not followed
-        say([currents(sampling.sequence, 0.5)])
-    assert stage.written == [0.0, 0.5, 0.5]
-    assert not stage.flying
-    assert len(node.errors) == 1
-    assert sampling.reset()[0]
-    say([currents(sampling.sequence, 0.5)])
-    say([currents(sampling.sequence, 0.0, session=2)])
-    say([currents(sampling.sequence, 0.7, session=2)])
-    assert stage.written == [0.0, 0.5, 0.5, 0.0, 0.7]
-
-
-def test_at_rest_another_controller_is_taken_up_and_its_end_is_no_fault() -> None:
-    stage = MadeUpStage(real=True)
-    sampling, node = start(stage)
-    node.answer(currents(0))
-    node.answer(Currents(sequence=0, session=1, status=Currents.GAVE_UP))
-    node.answer(currents(1, 0.4))
-    assert not sampling.controller.taken_up
-    node.answer(currents(2, session=2))
-    node.answer(currents(3, session=3))
-    node.answer(currents(4, 0.3, session=3))
-    assert stage.written == [0.0, 0.0, 0.0, 0.3]
-    assert stage.fault is None
-
-
-def test_real_time_without_a_controller_nothing_is_late() -> None:
-    sampling, node = start_realtime(MadeUpStage(real=True))
-    for _ in range(50):
-        node.tick()
-    node.inbox.messages = [currents(3)]  # it catches up with what it missed at its start
-    node.tick()
-    assert (sampling.answered, sampling.late_samples) == (False, 0)
-    node.inbox.messages = [currents(50)]
-    node.tick()
-    assert sampling.answered
 
 
 def test_a_stage_without_a_clock_gives_up_when_it_is_too_late(
