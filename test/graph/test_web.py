@@ -85,7 +85,7 @@ def test_an_emergency_stop_before_the_view_knows_any_node_lands_the_platen(
         page.press('Emergency stop')
         page.wait(lambda: '/controller/emergency_stop: ' in page.text())
         page.wait(lambda: landed_without_current(watching))
-        assert mode(watching) == ControllerState.FAULT
+        page.wait(lambda: mode(watching) == ControllerState.FAULT)
 
 
 def test_the_fields_of_the_page_go_with_its_step() -> None:
