@@ -49,6 +49,25 @@ def test_what_a_law_prints_is_no_part_of_the_design(
     assert capfd.readouterr().err == 'imported\nmade\n'
 
 
+def test_it_has_no_real_time_priority_when_it_imports(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    policy = tmp_path / 'policy'
+    look = f"import os; open('{policy}', 'w').write(str(os.sched_getscheduler(0)))"
+    (tmp_path / 'sitecustomize.py').write_text(look)  # the first that an environment may bring in
+    monkeypatch.setenv('PYTHONPATH', f'{tmp_path}:{os.environ["PYTHONPATH"]}')
+    before = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
+    except PermissionError:
+        pytest.skip('real-time priority is not permitted here (ulimit -r)')
+    try:
+        begun().result()
+    finally:
+        os.sched_setscheduler(0, *before)
+    assert policy.read_text() == str(os.SCHED_OTHER)
+
+
 @pytest.mark.parametrize('left', [0, 100])
 def test_a_design_that_is_not_whole_is_none(left: int) -> None:
     process = begun()

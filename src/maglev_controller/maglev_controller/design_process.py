@@ -21,11 +21,14 @@ from maglev_model.parameters import ParameterError
 
 _LONGEST = 20.0  # [s]
 
-# Gives back the real-time priority it has from the loop it shall not disturb, before it imports;
-# what a law of somebody else's prints goes to stderr.
+# Gives back the real-time priority it has from the loop it shall not disturb, before it imports
+# anything, packages of the environment (-S) included; what a law of somebody else's prints goes to
+# stderr.
 _PROGRAM = """
 import os
 os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+import site
+site.main()
 result = os.dup(1)
 os.dup2(2, 1)
 from maglev_controller.design_process import main
@@ -49,7 +52,7 @@ class DesignProcess:
                 pickle.dump((regulator.arrays, parameters), given)
                 given.seek(0)
                 self._process = subprocess.Popen(
-                    [sys.executable, '-c', _PROGRAM], stdin=given, stdout=self._output
+                    [sys.executable, '-S', '-c', _PROGRAM], stdin=given, stdout=self._output
                 )
                 self._files = files.pop_all()
         except OSError as error:
