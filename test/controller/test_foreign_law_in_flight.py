@@ -55,7 +55,7 @@ class Flight:
     def step(self, phase: Phase = Phase.TRACK) -> Mode:
         """One sample."""
         self.sequence += 1
-        references, time = self.supervisor.references, 1e-3 * self.sequence
+        references, time = self.supervisor.references, min(1e-3 * self.sequence, 0.6)
         position = np.array([0.025 + 0.01 * time, -0.02 + 0.1 * time, 0.0, 0.0, 0.0])
         velocity = np.array([0.01, 0.1, 0.0, 0.0, 0.0])
         if self.sequence == 0:

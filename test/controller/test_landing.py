@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from maglev_controller.landing import Landing, reference_fault
+from maglev_controller.landing import Landing
 from maglev_controller.parameters import ControllerParameters
 from maglev_model.quintic import quintic_to_zero, transition_time
 
@@ -91,14 +91,6 @@ def test_transition_time_keeps_the_acceleration() -> None:
     assert transition_time(0.001, 4.0, 0.2) == 0.2
 
 
-def test_a_reference_out_of_reach_is_named() -> None:
-    """Beyond the stops by more than the margin."""
-    assert reference_fault(PARAMETERS, np.array([0.031, 0.05, -0.05, 0.003, -0.014])) == ''
-    assert 'x is 0.06' in reference_fault(PARAMETERS, np.array([0.025, 0.06, 0, 0, 0]))
-    assert 'y is 25' in reference_fault(PARAMETERS, np.array([25.0, 0, 0, 0, 0]))
-    assert 'theta is nan' in reference_fault(PARAMETERS, np.array([0.025, 0, 0, 0, np.nan]))
-
-
 def test_it_may_brake_on_the_lower_stop_itself_but_on_no_other() -> None:
     """Down is where it goes; from those of x and z it keeps away, by 3 % of their way."""
     stop = np.array([UPPER[0], UPPER[1], LOWER[2], 0.0, 0.0])
@@ -119,18 +111,3 @@ def test_it_brakes_over_half_of_what_its_speed_would_cover() -> None:
     braking = PARAMETERS.landing.braking_time
     gone = rows[round(braking / PARAMETERS.sample_time), 0] - rows[0, 0]
     np.testing.assert_allclose(gone[:3], 0.5 * braking * speed[:3])
-
-
-@pytest.mark.parametrize('axis', range(5))
-def test_a_reference_may_stand_beyond_a_stop_by_the_margin_and_no_more(axis: int) -> None:
-    """Of the tilts: by what it is at the motors."""
-    margin = PARAMETERS.measurement.margin
-    slack = margin if axis < 3 else margin / PARAMETERS.machine.radius
-    for stop, way_out in ((UPPER, 1.0), (LOWER, -1.0)):
-        position = np.array([0.025, 0.0, 0.0, 0.0, 0.0])
-        position[axis] = stop[axis] + way_out * slack
-        assert reference_fault(PARAMETERS, position) == ''
-        position[axis] += way_out * 0.01 * slack
-        assert f'reference {("y", "x", "z", "phi", "theta")[axis]} is' in reference_fault(
-            PARAMETERS, position
-        )

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from maglev_controller.parameters import ControllerParameters
-from maglev_model.axes import AXES, FloatArray
+from maglev_model.axes import FloatArray
 from maglev_model.quintic import braking_times, quintic_to_zero
 
 _OFF_THE_STOPS = 0.03  # share of its way that an axis keeps off its stops: a bridge lands from 0.02
@@ -79,17 +79,3 @@ class Landing:
         position[0] = self._floor + offset
         self.done = self._elapsed >= self._braking + self._descent + self._settle
         return position, velocity, acceleration
-
-
-def reference_fault(parameters: ControllerParameters, position: FloatArray) -> str:
-    """Why a reference position (5,) [m, rad] cannot be followed, or an empty string.
-
-    Beyond the stops by more than the measurement's margin is out of reach.
-    """
-    machine, margin = parameters.machine, parameters.measurement.margin
-    bounds = zip(AXES, position, machine.lower_limit, machine.upper_limit, strict=True)
-    for axis, value, lower, upper in bounds:
-        slack = margin if axis in ('y', 'x', 'z') else margin / machine.radius
-        if not lower - slack <= value <= upper + slack:
-            return f'reference {axis} is {value:.6g}, the stops leave [{lower:.6g}, {upper:.6g}]'
-    return ''

@@ -11,6 +11,7 @@ from maglev_controller.landing import Landing
 from maglev_controller.learning import iterative_learning
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.reference_buffer import ReferenceBuffer
+from maglev_controller.reference_reach import ReferenceReach
 from maglev_controller.regulator import MeasurementFault, Regulator
 from maglev_model.axes import FloatArray
 from maglev_model.controller_watch import Status
@@ -53,7 +54,8 @@ class Supervisor:
         self._after_landing = Mode.DISABLED
         self._gave_up = False
         self._following_watch = FollowingWatch(parameters)
-        self._row = -1  # of the reference last followed
+        self._reach = ReferenceReach(parameters)
+        self._row = -1  # of the reference last followed in this flight
         self._may_lift_off = False  # a rest was seen since the enable
         self._segment = -1
         self._lower_stop = parameters.machine.gap_max
@@ -71,6 +73,7 @@ class Supervisor:
         self._regulate(np.full(4, self._lower_stop), 0.0, 0.0, rest, np.zeros(5), np.zeros(5))
         Landing(self.parameters, rest, np.zeros(5), np.zeros(5)).step()
         self._watch_following(rest, np.zeros(5))
+        self._reach.fault(rest, np.zeros(5), np.zeros(5))
         self._start_afresh()
         self._no_current()
 
@@ -110,6 +113,7 @@ class Supervisor:
                 self.learning = self.learning.redesigned(regulator.parameters)
         self.regulator, self.parameters = regulator, regulator.parameters
         self._following_watch = FollowingWatch(regulator.parameters)
+        self._reach = ReferenceReach(regulator.parameters)
         self._lower_stop = regulator.parameters.machine.gap_max
         self._hurry()
 
@@ -208,6 +212,7 @@ class Supervisor:
     def _start_afresh(self) -> None:
         self.regulator.reset()
         self._following_watch.reset()
+        self._row = -1
         if self.learning is not None:
             self.learning.rest()
 
@@ -223,6 +228,11 @@ class Supervisor:
 
     def _follow(self, row: int, gap: FloatArray, x: float, z: float) -> None:
         references = self.references
+        wanted = references.position[row], references.velocity[row], references.acceleration[row]
+        fault = self._reach.fault(*wanted)
+        if fault:
+            self._refuse_reference(fault, gap, x, z)
+            return
         phase, segment = references.phase.item(row), references.segment.item(row)
         if segment != self._segment:
             self._segment = segment
@@ -230,18 +240,20 @@ class Supervisor:
             if restart and phase == Phase.STEP:
                 self.regulator.reset(in_flight=True)
         self._row = row
-        self._regulate(
-            gap,
-            x,
-            z,
-            references.position[row],
-            references.velocity[row],
-            references.acceleration[row],
-            phase == Phase.TRACK,
-        )
+        self._regulate(gap, x, z, *wanted, phase == Phase.TRACK)
         if self.regulator.fault and self.mode == Mode.REGULATING:
             self.stop(self.regulator.fault)
-        self._watch_following(references.position[row], references.velocity[row])
+        self._watch_following(*wanted[:2])
+
+    def _refuse_reference(self, fault: str, gap: FloatArray, x: float, z: float) -> None:
+        """Land from where the last one was that could be followed; not to lift off is enough."""
+        if self._row < 0:
+            self.mode = Mode.WAITING
+        self.stop(fault)
+        if self.flying:
+            self._descend(gap, x, z)
+        else:
+            self._no_current()
 
     def _watch_following(self, position: FloatArray, velocity: FloatArray) -> None:
         """Give up a platen that does not follow: whoever lands it should not rely on this law.
