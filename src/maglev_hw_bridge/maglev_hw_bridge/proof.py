@@ -7,7 +7,7 @@ looks at the load; the first that does not names the parameter that is wrong.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -142,9 +142,10 @@ class Proof:
             for _ in range(round(_FLOW / self._period)):
                 self._drive()
             self._operator.wait(longest)
-            if not self._expired():
+            if running := self._running():
                 raise WrongError(
-                    f'the watchdog did not expire within {longest:g} s: see to boards.watchdog'
+                    f'the watchdog of board {" and ".join(running)} did not expire within '
+                    f'{longest:g} s: see to boards.watchdog'
                 )
             flows = self._operator.sees(Sight.CURRENT)
             enabled = self._boards.enable_output >= 0 and self._operator.sees(Sight.ENABLED)
@@ -157,13 +158,13 @@ class Proof:
             )
         self._tell('  watchdog: expires in time, no current: pass')
 
-    def _expired(self) -> bool:
-        """Whether the watchdog has: then it refuses the current that flowed."""
+    def _running(self) -> Sequence[str]:
+        """The boards whose watchdog has not expired: one that has refuses the current."""
         try:
             self._driver.write(self._amplifiers.volts)
-        except WatchdogError:
-            return True
-        return False
+        except WatchdogError as error:
+            return error.running
+        return self._boards.identifier
 
     def _emergency_stop(self) -> None:
         with self._started():

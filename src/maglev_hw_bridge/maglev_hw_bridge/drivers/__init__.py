@@ -6,6 +6,7 @@ a :class:`Driver`; the parameter ``driver`` names it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -23,7 +24,14 @@ class DriverError(RuntimeError):
 
 
 class WatchdogError(DriverError):
-    """The boards' watchdog expired: they went to their expiry states and refuse everything."""
+    """A board's watchdog expired: it went to its expiry states and refuses everything.
+
+    ``running``: the boards whose watchdog had not.
+    """
+
+    def __init__(self, message: str, running: Sequence[str] = ()) -> None:
+        super().__init__(message)
+        self.running = running
 
 
 class SampledDriver(Protocol):

@@ -148,16 +148,17 @@ class QuanserDriver:
             in_time = first.ask('watchdog_reload')
             in_time = second.ask('watchdog_reload') and in_time
             if not in_time:
-                raise WatchdogError(self._expired())
+                raise self._expired()
             first.put_out(first.volts)
             second.put_out(second.volts)
         except Exception as error:
             raise self._explain('putting out a sample', error) from error
 
-    def _expired(self) -> str:
-        return (
+    def _expired(self) -> WatchdogError:
+        return WatchdogError(
             f"the boards' watchdog expired: no sample for {self._parameters.boards.watchdog:g} s; "
-            'free the machine of other load, or raise boards.watchdog'
+            'free the machine of other load, or raise boards.watchdog',
+            [board.identifier for board in self._boards if not board.expired()],
         )
 
     def disable(self) -> None:
@@ -227,7 +228,7 @@ class QuanserDriver:
         if isinstance(error, WatchdogError):
             return error
         if any(board.armed and board.expired() for board in self._boards):
-            return WatchdogError(self._expired())
+            return self._expired()
         return DriverError(
             f'{doing} failed: {_in_words(error)}; check that both {self._parameters.boards.type} '
             f'boards ({", ".join(self._parameters.boards.identifier)}) are there and free'
