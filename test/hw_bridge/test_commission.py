@@ -14,7 +14,7 @@ import pytest
 import yaml
 from bridge_flight import HOME
 
-from maglev_hw_bridge.commission import Commissioning, run
+from maglev_hw_bridge.commission import Commissioning, _ended_by_signals, run
 from maglev_hw_bridge.diagnosis import _explanations, diagnose
 from maglev_hw_bridge.drivers.emulated import EmulatedBoards
 from maglev_hw_bridge.drivers.quanser import QuanserDriver
@@ -114,7 +114,8 @@ def test_the_first_lift_off_of_real_boards_is_on_time(
     assert not order
 
 
-def test_no_signal_ends_the_lift_off_in_the_air() -> None:
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTSTP])
+def test_no_signal_ends_the_lift_off_in_the_air(number: signal.Signals) -> None:
     seen: list[EmulatedBoards] = []
 
     def asked(boards: EmulatedBoards, step: str) -> None:
@@ -126,14 +127,35 @@ def test_no_signal_ends_the_lift_off_in_the_air() -> None:
         def signalled() -> None:
             tick()
             if boards.rig.state[0] < 0.0307:
-                _thread.interrupt_main(signal.SIGINT)
+                _thread.interrupt_main(number)
 
         boards.tick = signalled  # type: ignore[method-assign]
 
-    with pytest.raises(KeyboardInterrupt):
+    with _ended_by_signals(), pytest.raises(KeyboardInterrupt):
         commission({}, asked)
     assert seen[0].rig.state[0] == 0.031
     assert seen[0].rig.impact < 0.05
+
+
+@pytest.mark.parametrize('step', ['prove', 'motor 1'])
+@pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGHUP, signal.SIGTSTP])
+def test_a_signal_ends_it_where_current_flows(number: signal.Signals, step: str) -> None:
+    told: list[str] = []
+
+    def asked(boards: EmulatedBoards, question: str) -> None:
+        told.append(question)
+        tick = boards.tick
+
+        def signalled() -> None:
+            tick()
+            if question.startswith(step) and np.max(np.abs(boards.rig.phase_current)) > 0.4:
+                _thread.interrupt_main(number)
+
+        boards.tick = signalled  # type: ignore[method-assign]
+
+    with _ended_by_signals(), pytest.raises(KeyboardInterrupt):
+        commission({}, asked)
+    assert told[-1].startswith(step)
 
 
 FAULT = Fault('board', 'a cable was loose', 'see to it', True)

@@ -29,6 +29,7 @@ _SIGNALS = (
     signal.SIGHUP,
     signal.SIGINT,
     signal.SIGTERM,
+    signal.SIGTSTP,
     signal.SIGALRM,
     signal.SIGCHLD,
     signal.SIGUSR1,
@@ -37,7 +38,7 @@ _SIGNALS = (
 )
 
 
-_ENDING = (signal.SIGHUP, signal.SIGINT, signal.SIGTERM)
+_ENDING = (signal.SIGHUP, signal.SIGINT, signal.SIGTERM, signal.SIGTSTP)
 
 # Python's own pthread_sigmask makes a set of enums of each mask: 8 µs more, twice a sample
 _LIBC = ctypes.PyDLL(None)
@@ -64,7 +65,7 @@ def undisturbed() -> Iterator[None]:
 
 @contextlib.contextmanager
 def unbroken() -> Iterator[None]:
-    """What a signal that ends the process does, it does afterwards; in the main thread."""
+    """What a signal does that ends or stops the process, it does afterwards; in the main thread."""
     if threading.current_thread() is not threading.main_thread():  # where no signal is handled
         yield
         return

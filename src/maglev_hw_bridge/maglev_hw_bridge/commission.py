@@ -279,12 +279,12 @@ def _operator(driver: Driver, yes: bool) -> Operator:
 
 @contextlib.contextmanager
 def _ended_by_signals() -> Iterator[None]:
-    """SIGTERM and SIGHUP end it in order, as SIGINT does."""
+    """SIGTERM, SIGHUP and SIGTSTP (Ctrl-Z) end it in order, as SIGINT does: none leaves current."""
 
     def end(_number: int, _frame: object) -> None:
         raise KeyboardInterrupt
 
-    numbers = (signal.SIGTERM, signal.SIGHUP)
+    numbers = (signal.SIGTERM, signal.SIGHUP, signal.SIGTSTP)
     before = [signal.signal(number, end) for number in numbers]
     try:
         yield
