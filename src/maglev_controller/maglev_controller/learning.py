@@ -90,6 +90,11 @@ class IterativeLearning:
         return self.arrays.history[: int(self.arrays.state['flown'][0])]
 
     @property
+    def learned(self) -> FloatArray:
+        """A copy of what :meth:`save` writes, :attr:`table` above :attr:`history`."""
+        return np.concatenate((self.table, self.history))
+
+    @property
     def learning(self) -> bool:
         """Whether it learns, or will on the next pass."""
         return bool(self.arrays.state['stage'][0] == LEARNING)

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
+import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import SetBool, Trigger
 
@@ -92,7 +93,8 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         self._pending: Any = None  # measurement that waits for its reference
         self._pending_since = self._answered = 0.0
         self._reference_lost = self._reference_over = self._silent = False
-        self._passes = 0  # learned from, when last looked at
+        learning = self.supervisor.learning
+        self._learned = learning.learned if learning else np.zeros(0)  # when last looked at
         self._logged = (self.supervisor.mode, self.supervisor.reason)
         self._session = secrets.randbits(64) | 1
         GraphGuard(self, lambda: self.supervisor.flying).claim(CURRENTS, 'controller')
@@ -295,19 +297,20 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
             response.message = "nothing repeats: give 'learning.period' and 'learning.passes'"
         elif request.data:
             learning.begin()
-            self._passes = 0
             response.message = f'learning over {self.parameters.learning.passes} passes'
         else:
             learning.end()
             response.message = learning.describe()
+            if not self.supervisor.flying:
+                self._save_learned()
         return response
 
     def _save_learned(self) -> None:
         """On the ground, where the time does not matter."""
         learning, path = self.supervisor.learning, self.parameters.learning.file
-        if learning is None or len(learning.history) in (0, self._passes):
+        if learning is None or np.array_equal(learning.learned, self._learned):
             return
-        self._passes = len(learning.history)
+        self._learned = learning.learned
         self.get_logger().info(learning.describe())
         try:
             if path:
