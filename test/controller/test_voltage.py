@@ -82,6 +82,22 @@ def test_a_voltage_that_is_given_in_flight_finds_the_currents_that_flow(voltage:
     np.testing.assert_allclose(currents[0], before, atol=0.01)
 
 
+def test_a_saved_regulator_remembers_the_currents_that_flow() -> None:
+    """From where 10 V take some samples to bring them elsewhere."""
+    stage = SimulatedStage(build(PlantParameters, {'initial.position': tuple(NEAR)}))
+    regulator = Regulator(build(ControllerParameters, {'winding.voltage': 10.0}))
+    run(regulator, stage, held(NEAR, 0.1, PERIOD))
+    saved = stage.arrays.block.copy(), regulator.save()
+    step = held(NEAR + np.array([0.005, 0.005, 0.0, 0.0, 0.0]), 0.01, PERIOD)
+    ways = []
+    for _ in range(2):
+        stage.arrays.block[:] = saved[0]
+        regulator.restore(saved[1])
+        ways.append(run(regulator, stage, step))
+    np.testing.assert_array_equal(ways[0].quadrature_current, ways[1].quadrature_current)
+    np.testing.assert_array_equal(ways[0].direct_current, ways[1].direct_current)
+
+
 @pytest.mark.parametrize('voltage', [0.0, 28.0])
 def test_a_law_that_begins_anew_at_a_step_does_not_forget_the_currents_that_flow(
     voltage: float,

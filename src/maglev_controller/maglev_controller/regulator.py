@@ -197,11 +197,14 @@ class Regulator:
 
     def save(self) -> tuple[Any, ...]:
         """What is remembered from sample to sample, for :meth:`restore`."""
-        return self._arrays.axes.copy(), self._arrays.xi.copy(), copy.deepcopy(self.foreign)
+        records, xi = self._arrays.records, self._arrays.xi
+        foreign = copy.deepcopy(self.foreign)
+        return records['axes'].copy(), records['sample'].copy(), xi.copy(), foreign
 
     def restore(self, saved: tuple[Any, ...]) -> None:
         """Go back to what was saved."""
-        self._arrays.axes[:], self._arrays.xi[:], foreign = saved
+        records, xi = self._arrays.records, self._arrays.xi
+        records['axes'], records['sample'], xi[:], foreign = saved
         self.foreign = copy.deepcopy(foreign)
 
     def step(
