@@ -148,11 +148,13 @@ MODEL: Final = np.dtype(
         ('oscillates', '?'),
         ('first', 'i8'),
         ('end', 'i8'),
+        ('following', 'f8'),
     ],
     align=True,
 )
 """What belongs to one state of an internal model: elements of κ (Γ included), N_d and E_d; whether
-it is an oscillator's that fades at rest; and between which columns its row of Φ_d is not zero."""
+it is an oscillator's that fades at rest; between which columns its row of Φ_d is not zero; and room
+for ξ as it follows from this one."""
 
 
 class ControlArrays(NamedTuple):

@@ -26,7 +26,7 @@ from maglev_controller.notch_filter import notched
 from maglev_controller.rest import error_to_learn, note_motion, shares
 from maglev_controller.voltage import keep_within_voltage
 from maglev_model.axes import FloatArray
-from maglev_model.compiled import borrowing, compiled
+from maglev_model.compiled import borrowing
 from maglev_model.equilibrium import equilibrium_inverse
 from maglev_model.inverse import (
     CURRENT,
@@ -207,16 +207,9 @@ def _lost(settings: Record, sample: Record, index: int) -> float:
     return float(sample.excess[index - 1]) if index == 1 or index == 2 else 0.0
 
 
-@compiled
+@borrowing
 def advance_models(control: ControlArrays, settings: Record, sample: Record) -> None:
     """ξ⁺ = Φ_d ξ + N_d e + E_d (what was realised less what was wanted), (14), (17)."""
-    _advance_models(control, settings, sample, np.empty(control.xi.shape[1]))
-
-
-@borrowing
-def _advance_models(
-    control: ControlArrays, settings: Record, sample: Record, following: FloatArray
-) -> None:
     models, transition, xi = control.models, control.transition, control.xi
     axes = control.records[0].axes
     states = xi.shape[1]
@@ -231,9 +224,9 @@ def _advance_models(
             value = models[index, row].drive * told + models[index, row].antiwindup * lost
             for column in range(models[index, row].first, models[index, row].end):
                 value += transition[index, row, column] * xi[index, column]
-            following[row] = kept * value if oscillates else value
+            models[index, row].following = kept * value if oscillates else value
         for row in range(states):
-            xi[index, row] = following[row]
+            xi[index, row] = models[index, row].following
 
 
 @borrowing
