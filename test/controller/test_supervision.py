@@ -70,6 +70,22 @@ def test_another_reference_in_flight_is_not_followed_either(supervisor: Supervis
         assert flight.step(Phase.TRACK, HOVER, 0.031) == Mode.WAITING
 
 
+def test_a_flight_that_is_not_followed_is_looked_into_once(
+    supervisor: Supervisor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    flight, looked = Flight(supervisor), []
+    flight.step(Phase.REST, STOP, 0.031)
+    flight.sequence += 500
+    flight.step(Phase.TRACK, HOVER, 0.031)
+    find = supervisor.references.find
+    monkeypatch.setattr(supervisor.references, 'find', lambda n: looked.append(n) or find(n))
+    for _ in range(3):
+        assert flight.step(Phase.TRACK, HOVER, 0.031) == Mode.WAITING
+    assert len(looked) == 3  # the samples' own
+    flight.step(Phase.REST, STOP, 0.031)
+    assert flight.step(Phase.LIFT_OFF, STOP, 0.031) == Mode.REGULATING
+
+
 def test_a_landing_cannot_be_called_off(supervisor: Supervisor) -> None:
     flight = Flight(supervisor)
     flight.step(Phase.REST, STOP, 0.031)

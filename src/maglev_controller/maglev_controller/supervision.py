@@ -56,7 +56,7 @@ class Supervisor:
         self._following_watch = FollowingWatch(parameters)
         self._reach = ReferenceReach(parameters)
         self._row = -1  # of the reference last followed in this flight
-        self._may_lift_off = False  # a rest was seen since the enable
+        self._may_lift_off = False  # a rest was seen since the enable, and since a flight's middle
         self._segment = -1
         self._lower_stop = parameters.machine.gap_max
         self._hurried = hurried
@@ -195,12 +195,17 @@ class Supervisor:
             self._no_current()
 
     def _await_lift_off(self, row: int) -> None:
-        """Regulate from a lift-off on that begins, and where a rest was seen since the enable."""
+        """Regulate from a lift-off on that begins, and where a rest was seen since the enable.
+
+        What comes from the middle of a flight is looked into once, until there is a rest again.
+        """
         if not self._wants_current(row):
             self._may_lift_off = True
-        elif self._may_lift_off and self._just_rested(row):
-            self._start_afresh()
-            self.mode = Mode.REGULATING
+        elif self._may_lift_off:
+            self._may_lift_off = self._just_rested(row)
+            if self._may_lift_off:
+                self._start_afresh()
+                self.mode = Mode.REGULATING
 
     def _just_rested(self, row: int) -> bool:
         """Whether one of the references right before wants no current, seen in time or not."""
