@@ -20,7 +20,7 @@ def load(text: str) -> Any:
     """What a text says; raises yaml.YAMLError, also for a mapping that names a key twice."""
     try:
         return yaml.load(text, Loader=_Loader)
-    except ValueError as error:  # of a number that Python does not make
+    except (ValueError, RecursionError) as error:  # of a number or a depth beyond Python's
         raise yaml.YAMLError(str(error)) from error
 
 
@@ -30,6 +30,10 @@ def dump(content: object) -> str:
 
 
 class _Loader(yaml.SafeLoader):
+    def __init__(self, stream: str) -> None:
+        super().__init__(stream)
+        self.deep_construct = True  # so that an alias within what it stands for is an error
+
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         """Raises yaml.YAMLError with the key that is none, or is given twice, and its line."""
         seen: set[Any] = set()
