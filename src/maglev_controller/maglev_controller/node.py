@@ -218,8 +218,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         self._publish_state(message.stamp, sequence)
         if (supervisor.mode, supervisor.reason) != self._logged:
             self._log_change()
-            if not supervisor.flying:
-                self._save_learned()
+            self._save_learned()
 
     def _publish_currents(self, sequence: int) -> None:
         message = self._currents
@@ -301,19 +300,18 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         else:
             learning.end()
             response.message = learning.describe()
-            if not self.supervisor.flying:
-                self._save_learned()
+            self._save_learned()
         return response
 
     def _save_learned(self) -> None:
         """On the ground, where the time does not matter."""
-        learning, path = self.supervisor.learning, self.parameters.learning.file
-        if learning is None or np.array_equal(learning.learned, self._learned):
+        learning, flying = self.supervisor.learning, self.supervisor.flying
+        if learning is None or flying or np.array_equal(learning.learned, self._learned):
             return
         self._learned = learning.learned
         self.get_logger().info(learning.describe())
         try:
-            if path:
+            if path := self.parameters.learning.file:
                 learning.save(path)
         except OSError as error:
             self.get_logger().error(f'what was learned is not saved: {error}')

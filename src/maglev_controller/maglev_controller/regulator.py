@@ -197,14 +197,12 @@ class Regulator:
 
     def save(self) -> tuple[Any, ...]:
         """What is remembered from sample to sample, for :meth:`restore`."""
-        records, xi = self._arrays.records, self._arrays.xi
-        foreign = copy.deepcopy(self.foreign)
-        return records['axes'].copy(), records['sample'].copy(), xi.copy(), foreign
+        records = self._arrays.records[['axes', 'sample']]
+        return records.copy(), self._arrays.xi.copy(), copy.deepcopy(self.foreign)
 
     def restore(self, saved: tuple[Any, ...]) -> None:
         """Go back to what was saved."""
-        records, xi = self._arrays.records, self._arrays.xi
-        records['axes'], records['sample'], xi[:], foreign = saved
+        self._arrays.records[['axes', 'sample']], self._arrays.xi[:], foreign = saved
         self.foreign = copy.deepcopy(foreign)
 
     def step(
