@@ -118,6 +118,16 @@ def test_a_watchdog_that_expires_late_or_never(
         prove({}, nothing)
 
 
+def stretched(boards: EmulatedBoards) -> None:
+    sleep = boards.sleep
+    boards.sleep = lambda seconds: sleep(2.0 * seconds)  # type: ignore[method-assign]
+
+
+def test_a_wait_that_a_busy_machine_stretches_proves_no_watchdog() -> None:
+    with pytest.raises(WrongError, match=r'took 0\.080 s for a wait of 0\.04 s'):
+        prove({}, stretched)
+
+
 class DisablesNothing(QuanserDriver):
     """Where the emergency stop is pressed."""
 

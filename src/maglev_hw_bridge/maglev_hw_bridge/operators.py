@@ -57,8 +57,8 @@ class Operator(Protocol):
         """Whether it is so; ``meanwhile`` is called again and again until the answer is there."""
         ...
 
-    def wait(self, seconds: float) -> None:
-        """Let time pass on the boards."""
+    def wait(self, seconds: float) -> float:
+        """Let time pass on the boards; how much has passed [s]."""
         ...
 
 
@@ -96,9 +96,11 @@ class Person:
             answer = input().strip().lower()
         return answer in ('y', 'yes')
 
-    def wait(self, seconds: float) -> None:
+    def wait(self, seconds: float) -> float:
         """See the protocol."""
+        begun = time.monotonic()
         time.sleep(seconds)
+        return time.monotonic() - begun
 
 
 def _agreed(question: str) -> bool:
@@ -142,6 +144,8 @@ class EmulatedPerson:
             return self._boards.lines.enabled
         return bool(np.abs(self._boards.rig.phase_current[0]) > _A_CURRENT)
 
-    def wait(self, seconds: float) -> None:
+    def wait(self, seconds: float) -> float:
         """See the protocol."""
+        begun = self._boards.now()
         self._boards.sleep(seconds)
+        return self._boards.now() - begun

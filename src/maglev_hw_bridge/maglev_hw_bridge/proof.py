@@ -19,6 +19,7 @@ from maglev_hw_bridge.signal_parameters import PHASES
 
 _CURRENT = 0.5  # through the load [A]
 _FLOW = 0.5  # for so long, before the watchdog is let expire [s]
+_STRETCHED = 1.5  # of a wait, beyond which nothing is proven by it
 _PRESS = 15.0  # time to press the stop [s]
 
 
@@ -141,11 +142,16 @@ class Proof:
         with self._started():
             for _ in range(round(_FLOW / self._period)):
                 self._drive()
-            self._operator.wait(longest)
+            waited = self._operator.wait(longest)
             if running := self._running():
                 raise WrongError(
                     f'the watchdog of board {" and ".join(running)} did not expire within '
                     f'{longest:g} s: see to boards.watchdog'
+                )
+            if waited > _STRETCHED * longest:
+                raise WrongError(
+                    f'this machine took {waited:.3f} s for a wait of {longest:g} s, in which a '
+                    'watchdog that is late expires too: free it of other load'
                 )
             flows = self._operator.sees(Sight.CURRENT)
             enabled = self._boards.enable_output >= 0 and self._operator.sees(Sight.ENABLED)
