@@ -53,6 +53,7 @@ TESTS: dict[str, tuple[str, ...]] = {
     ),
     'maglev_model.controller_watch': ('test/model/test_controller_watch.py',),
     'maglev_controller.landing': ('test/controller/test_landing.py',),
+    'maglev_controller.reference_reach': ('test/controller/test_reference_reach.py',),
     'maglev_hw_bridge.amplifiers': bridge_tests('amplifiers'),
     'maglev_hw_bridge.encoders': bridge_tests('encoders'),
     'maglev_hw_bridge.observer': bridge_tests('observer', 'guard'),
