@@ -70,6 +70,7 @@ FLYING: dict[str, tuple[str, ...]] = {
         'test/controller/test_supervised_parts.py',
         'test/controller/test_supervision.py',
         'test/controller/test_platen_does_not_follow.py',
+        'test/controller/test_unreachable_reference.py',
         'test/controller/test_foreign_law.py',
         'test/controller/test_foreign_law_in_flight.py',
     ),

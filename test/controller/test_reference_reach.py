@@ -1,19 +1,15 @@
-"""What reference a controller does not follow, whoever sends it, and what it does then."""
+"""What reference a controller does not follow, whoever sends it."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from supervised import HOVER, QUICK, STOP, Flight
+from supervised import HOVER
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.reference_reach import ReferenceReach
-from maglev_controller.supervision import Supervisor
+from maglev_controller.sample_step import LARGEST_REFERENCE
 from maglev_model.axes import AXES
-from maglev_model.controller_watch import Status
-from maglev_model.modes import Mode
-from maglev_model.parameters import build
-from maglev_model.phases import Phase
 
 PARAMETERS = ControllerParameters()
 LOWER = np.array(PARAMETERS.machine.lower_limit)
@@ -58,42 +54,13 @@ def test_so_are_its_derivatives(axis: int, value: float, why: str) -> None:
         assert f'{AXES[axis]} {why}' in REACH.fault(HOVER, *derivatives)
 
 
-@pytest.mark.parametrize(('axis', 'value'), [(0, 0.01), (0, 0.034), (1, np.nan), (4, 0.1)])
-def test_it_is_landed_from_where_the_last_was_that_could_be_followed(
-    axis: int, value: float
-) -> None:
-    flight = Flight(Supervisor(build(ControllerParameters, QUICK)))
-    supervisor = flight.supervisor
-    flight.step(Phase.REST, STOP, 0.031)
-    assert flight.step(Phase.LIFT_OFF, HOVER, 0.025) == Mode.REGULATING
-    wrong = HOVER.copy()
-    wrong[axis] = value
-    assert flight.step(Phase.TRACK, wrong, 0.025) == Mode.LANDING
-    assert f'the reference of {AXES[axis]} is' in supervisor.reason
-    assert supervisor.status == Status.FLYING
-    assert supervisor.direct_current.all()
-    assert supervisor._landing is not None
-    np.testing.assert_allclose(supervisor._landing.step()[0][1:], 0.0, atol=1e-12)
-    while supervisor.flying:
-        flight.step(Phase.TRACK, wrong, 0.031)
-    assert supervisor.mode == Mode.FAULT
-    assert supervisor.reset_fault()[0]
-
-
-def test_it_is_not_lifted_off_to() -> None:
-    flight = Flight(Supervisor(build(ControllerParameters, QUICK)))
-    for _ in range(2):  # also where a flight was before
-        flight.step(Phase.REST, STOP, 0.031)
-        wrong = STOP + 1e-2
-        assert flight.step(Phase.LIFT_OFF, wrong, 0.031) == Mode.FAULT
-        assert 'the reference of y is 0.041 m' in flight.supervisor.reason
-        assert not flight.supervisor.direct_current.any()
-        assert flight.supervisor.status == Status.RESTING
-        flight.supervisor.reset_fault()
-        flight.supervisor.enable()
-        flight.step(Phase.REST, STOP, 0.031)
-        assert flight.step(Phase.LIFT_OFF, HOVER, 0.031) == Mode.REGULATING
-        flight.supervisor.disable()
-        while flight.supervisor.flying:
-            flight.step(Phase.REST, STOP, 0.031)
-        flight.supervisor.enable()
+@pytest.mark.parametrize('axis', range(5))
+def test_the_bounds_themselves_are_within_reach(axis: int) -> None:
+    margin = PARAMETERS.measurement.margin / (1.0 if axis < 3 else PARAMETERS.machine.radius)
+    fast = STILL.copy()
+    fast[axis] = LARGEST_REFERENCE
+    for bound in (LOWER[axis] - margin, UPPER[axis] + margin):
+        position = HOVER.copy()
+        position[axis] = bound
+        assert at(*position) == ''
+        assert 'moves beyond any machine' in REACH.fault(position, fast, STILL)
