@@ -103,12 +103,6 @@ class EmulatedCard:
         _memory(minima, np.float64, n)
         _memory(maxima, np.float64, n)
 
-    def set_encoder_counts(self, channels: Any, n: int, counts: Any) -> None:
-        """Set counters; the emulated ones keep what the platen's position makes them."""
-        self._check()
-        _channels(channels, n, CHANNELS)
-        raise HILError(Code.HARDWARE, 'the emulated counters cannot be set')
-
     def read_encoder(self, channels: Any, n: int, counts: Any) -> None:
         """Counters right now, int32."""
         self._check()

@@ -156,11 +156,6 @@ class World(EmulatedBoards):
         for _ in range(samples):
             self.tick()
 
-    def output_error(self) -> NDArray[np.float64]:
-        """What the phases' outputs (12,) are off the voltage that makes no current [V]."""
-        volts = super().outputs()
-        return volts - np.where(volts == 0.0, 0.0, self._no_current)
-
     def cure(self) -> None:
         """Everything is sound from now on; what counters have lost stays lost."""
         self.stuck[:] = False
