@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import dataclasses
 
+import numpy as np
+
 from maglev_controller.foreign_law import ForeignLawParameters
 from maglev_controller.learning_parameters import LearningParameters
 from maglev_controller.stage_parameters import (
@@ -20,6 +22,7 @@ from maglev_controller.supervision_parameters import (
     MeasurementParameters,
     OwnLandingParameters,
 )
+from maglev_model.axes import FloatArray
 from maglev_model.loop_parameters import (
     AxisLoopParameters,
     FundamentalParameters,
@@ -293,3 +296,11 @@ class ControllerParameters:
     def axes(self) -> tuple[AxisParameters, ...]:
         """The five axes in output order."""
         return (self.y, self.x, self.z, self.phi, self.theta)
+
+    @property
+    def reach(self) -> tuple[FloatArray, FloatArray]:
+        """Least and greatest outputs (5,) [m, rad]: at the stops, and the margin beyond them."""
+        margin = np.full(5, self.measurement.margin)
+        margin[3:] /= self.machine.radius
+        lower, upper = self.machine.lower_limit, self.machine.upper_limit
+        return np.array(lower) - margin, np.array(upper) + margin

@@ -42,13 +42,8 @@ class ReferenceReach:
     """The stops, and a margin beyond them: as far as the encoders may read."""
 
     def __init__(self, parameters: ControllerParameters) -> None:
-        machine = parameters.machine
-        margin = np.full(5, parameters.measurement.margin)
-        margin[3:] /= machine.radius
-        self._arrays = ReachArrays(
-            lower=np.array(machine.lower_limit) - margin,
-            upper=np.array(machine.upper_limit) + margin,
-        )
+        lower, upper = parameters.reach
+        self._arrays = ReachArrays(lower=lower, upper=upper)
 
     def fault(self, position: FloatArray, velocity: FloatArray, acceleration: FloatArray) -> str:
         """Why a reference (5,) [m, rad], with its derivatives (5,), cannot be followed, or ''."""

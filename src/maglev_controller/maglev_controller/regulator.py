@@ -335,8 +335,7 @@ def _settings(
     parameters: ControllerParameters, designs: Sequence[AxisDesign]
 ) -> dict[str, ArrayLike]:
     machine, limits = parameters.machine, parameters.limits
-    margin = np.full(5, parameters.measurement.margin)
-    margin[3:] /= machine.radius
+    lower, upper = parameters.reach
     gains = np.array([design.gain[:2] for design in designs])
     filters = np.array([design.derivative for design in designs])
     observers = np.array([design.observer for design in designs])
@@ -346,8 +345,8 @@ def _settings(
         'period': parameters.sample_time,
         'learns': parameters.learning.period > 0.0,
         'controlled': [axis.controlled for axis in parameters.axes],
-        'lower': np.array(machine.lower_limit) - margin,
-        'upper': np.array(machine.upper_limit) + margin,
+        'lower': lower,
+        'upper': upper,
         'warp': parameters.measurement.warp,
         'inverse': INVERSES.index(parameters.inverse),
         'equilibrium': parameters.compensator.equilibrium,
