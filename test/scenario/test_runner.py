@@ -227,7 +227,7 @@ def test_quietly_only_what_is_wrong_is_said(tree: Tree) -> None:
     assert code == 1
     assert 'ellipse: controller: warning: ' in output
     assert output.endswith(f'ellipse: FAILED, see {tree.out}-2\n')
-    assert 'um' not in output
+    assert ' um' not in output
 
 
 def test_json_is_all_there_is_on_the_standard_output(tree: Tree) -> None:
