@@ -72,6 +72,7 @@ def test_without_a_machine_file_each_node_starts_with_its_own(tree: Tree) -> Non
         (['--params', 'none.yaml'], "there is no file 'none.yaml'"),
         (['--params', 'typo.yaml'], "parameters for 'contoller', which is no node"),
         (['--params', 'twice.yaml'], "'speed' is given twice"),
+        (['--params', 'merged.yaml'], "'<<' in line 4: ROS does not merge mappings"),
         (['--params', 'other.yaml', '--namespace', 'b'], "parameters for '/a/plant', which is no"),
         (['--namespace', ''], "--namespace is ''"),
         (['--namespace', '/'], "--namespace is '/'"),
@@ -86,6 +87,9 @@ def test_without_a_machine_file_each_node_starts_with_its_own(tree: Tree) -> Non
 def test_options_that_make_no_sense(tree: Tree, options: list[str], words: str) -> None:
     (tree.path / 'typo.yaml').write_text('# why\n\ncontoller:\n  ros__parameters:\n    a: 1\n')
     (tree.path / 'twice.yaml').write_text('plant:\n  ros__parameters: {speed: 1, speed: 2}\n')
+    (tree.path / 'merged.yaml').write_text(
+        'plant: &one\n  ros__parameters: {speed: 1}\nreference:\n  <<: *one\n'
+    )
     (tree.path / 'other.yaml').write_text('/a/plant:\n  ros__parameters: {speed: 1}\n')
     (tree.path / 'flat.yaml').write_text('controller:\n  speed: 1\n')
     code, output = tree.run(*options)

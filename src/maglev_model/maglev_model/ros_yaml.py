@@ -35,11 +35,13 @@ class _Loader(yaml.SafeLoader):
         self.deep_construct = True  # so that an alias within what it stands for is an error
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        """Raises yaml.YAMLError with the key that is none, or is given twice, and its line."""
+        """Raises yaml.YAMLError with the key that is none, merges, or is given twice; its line."""
         seen: set[Any] = set()
         for key_node, _ in node.value:
-            key = self.construct_object(key_node, deep=True)  # type: ignore[no-untyped-call]
             line = key_node.start_mark.line + 1
+            if key_node.tag == 'tag:yaml.org,2002:merge':
+                raise yaml.YAMLError(f"'<<' in line {line}: ROS does not merge mappings")
+            key = self.construct_object(key_node, deep=True)  # type: ignore[no-untyped-call]
             if not isinstance(key, Hashable):
                 raise yaml.YAMLError(f'{key} in line {line} is no name')
             if key in seen:
