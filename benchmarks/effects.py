@@ -9,6 +9,7 @@ steps, cost more than the limit.
 
 from __future__ import annotations
 
+import argparse
 import sys
 import time
 from pathlib import Path
@@ -56,6 +57,7 @@ def stages() -> dict[str, SimulatedStage]:
 
 def main() -> int:
     """Measure in turns, print the best of each by the best of the plain plant."""
+    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     made = stages()
     best = dict.fromkeys(made, float('inf'))
     for stage in made.values():

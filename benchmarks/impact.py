@@ -8,6 +8,7 @@ the stops. Exits with 1 when a landing is not soft.
 
 from __future__ import annotations
 
+import argparse
 import math
 import sys
 
@@ -85,6 +86,7 @@ def cut(motion: References) -> tuple[float, float, str]:
 
 def main() -> int:
     """Print the table; tell by the exit code whether every landing was soft."""
+    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     still = np.zeros(5)
     places: list[tuple[str, References]] = [
         (
