@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import re
 from collections.abc import Callable
@@ -15,7 +16,7 @@ from maglev_hw_bridge.drivers.emulated import EmulatedBoards
 from maglev_hw_bridge.drivers.quanser import QuanserDriver
 from maglev_hw_bridge.emulated_card import EmulatedCard
 from maglev_hw_bridge.memory import Memory
-from maglev_hw_bridge.operators import EmulatedPerson, Person, Sight
+from maglev_hw_bridge.operators import EmulatedPerson, Person
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.proof import Proof, WrongError
 from maglev_model.parameters import build
@@ -49,12 +50,13 @@ def nothing(_boards: EmulatedBoards) -> None:
 
 
 def test_the_last_line_is_proven() -> None:
-    told = prove({}, nothing)
+    where, *told = prove({}, nothing)
+    assert where.endswith('at motor 1 phase a and motor 4 phase c')
     assert [line.split(':')[0].strip() for line in told] == [
         'stop input', 'enable line', 'watchdog', 'emergency stop',
     ]  # fmt: skip
     assert all(line.endswith('pass') for line in told)
-    told = prove({'boards.stop_input': -1, 'boards.enable_output': -1}, nothing)
+    _, *told = prove({'boards.stop_input': -1, 'boards.enable_output': -1}, nothing)
     assert 'no emergency stop to prove' in told[0]
     assert 'no enable line to prove' in told[1]
     told = prove({'boards.enable_output': -1}, nothing)
@@ -91,7 +93,7 @@ def stays_enabled(boards: EmulatedBoards) -> None:
 @pytest.mark.parametrize(
     ('spoil', 'text'),
     [
-        (never_enabled, 'no current flows even when enabled'),
+        (never_enabled, 'flows at motor 1 phase a and motor 4 phase c even when enabled'),
         (always_enabled, 'whether enabled or not'),
         (stays_enabled, 'enabled after the watchdog expired'),
     ],
@@ -99,6 +101,50 @@ def stays_enabled(boards: EmulatedBoards) -> None:
 def test_a_last_line_that_does_not_work(spoil: Callable[[EmulatedBoards], None], text: str) -> None:
     with pytest.raises(WrongError, match=text):
         prove({}, spoil)
+
+
+LOADS = {0: 'motor 1 phase a', 1: 'motor 4 phase c'}
+BOARDS = np.repeat([0, 1], 6)
+
+
+def off_the_line(board: int, boards: EmulatedBoards) -> None:
+    advance = boards.rig.advance
+    boards.rig.advance = lambda volts: advance(  # type: ignore[method-assign]
+        np.where(board == BOARDS, boards.outputs(), volts)
+    )
+
+
+def without_supply(board: int, boards: EmulatedBoards) -> None:
+    advance = boards.rig.advance
+    boards.rig.advance = lambda volts: advance(  # type: ignore[method-assign]
+        np.where(board == BOARDS, boards._no_current, volts)
+    )
+
+
+@pytest.mark.parametrize('board', [0, 1])
+def test_amplifiers_of_one_board_that_do_not_obey(board: int) -> None:
+    load = LOADS[board]
+    with pytest.raises(WrongError, match=f'current flows at {load} whether enabled or not'):
+        prove({}, functools.partial(off_the_line, board))
+    with pytest.raises(WrongError, match=f'no current flows at {load} even when enabled'):
+        prove({}, functools.partial(without_supply, board))
+    with pytest.raises(WrongError, match=f'no current flows at {load}: check amplifier'):
+        prove({'boards.enable_output': -1}, functools.partial(without_supply, board))
+
+
+@pytest.mark.parametrize('board', [0, 1])
+def test_outputs_of_one_board_that_outlive_its_watchdog(
+    board: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    expire = EmulatedCard.expire
+
+    def hold(card: EmulatedCard) -> None:
+        card._expiration = card._number != board
+        expire(card)
+
+    monkeypatch.setattr(EmulatedCard, 'expire', hold)
+    with pytest.raises(WrongError, match=f'current flows on at {LOADS[board]} after the watchdog'):
+        prove({'boards.enable_output': -1}, nothing)
 
 
 @pytest.mark.parametrize('boards', ['0', '1', '01'])
@@ -138,7 +184,7 @@ class DisablesNothing(QuanserDriver):
 
 
 def test_a_driver_that_disables_nothing_once_the_stop_is_pressed() -> None:
-    with pytest.raises(WrongError, match='current flows on after an emergency stop'):
+    with pytest.raises(WrongError, match=r'current flows on at .* after an emergency stop'):
         prove({}, nothing, DisablesNothing)
 
 
@@ -165,7 +211,7 @@ def test_current_flows_on_until_somebody_answers_clearly(
     typed = ['', '\n', '', f'{answer}\n']
     with open(terminal) as stdin, open(keyboard, 'w', buffering=1) as keys:
         monkeypatch.setattr('sys.stdin', stdin)
-        assert Person().sees(Sight.CURRENT, lambda: print(typed.pop(0), end='', file=keys)) == seen
+        assert Person().sees_current(3, lambda: print(typed.pop(0), end='', file=keys)) == seen
     assert not typed
 
 

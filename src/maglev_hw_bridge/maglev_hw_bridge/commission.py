@@ -144,7 +144,7 @@ class Commissioning:
 
     def _last_line(self) -> None:
         self._ask(
-            'prove the last line with dummy loads, up to 0.5 A in motor 1 phase a: stop input, '
+            'prove the last line with dummy loads, 0.5 A in one of each board: stop input, '
             'enable line, watchdog, emergency stop'
         )
         with self._current():

@@ -12,6 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from maglev_hw_bridge.drivers.emulated import EmulatedBoards
+from maglev_hw_bridge.signal_parameters import PHASE_NAMES
 
 _A_CURRENT = 0.1  # that shows at a load [A]
 Meanwhile = Callable[[], None]
@@ -21,21 +22,14 @@ class Act(enum.Enum):
     """What is asked of the operator."""
 
     LOADS = (
-        'disconnect the motors and connect dummy loads instead, at motor 1 phase a one that shows '
-        'its current (a lamp, a meter)'
+        'disconnect the motors and connect dummy loads instead, of which those named above show '
+        'their current (a lamp, a meter)'
     )
     MOTORS = 'disconnect the loads and connect the motors again'
     PRESS = 'press the emergency stop'
     RELEASE = 'release the emergency stop'
     UNPLUG = "pull the plug of the emergency stop's wire, as if it were broken"
     PLUG = 'put the plug back'
-
-
-class Sight(enum.Enum):
-    """What the operator is asked for."""
-
-    CURRENT = 'does the load at motor 1 phase a carry current now?'
-    ENABLED = 'do the amplifiers show that they are enabled now?'
 
 
 class Operator(Protocol):
@@ -53,8 +47,15 @@ class Operator(Protocol):
         """Be told to do it within the next seconds; returns at once."""
         ...
 
-    def sees(self, what: Sight, meanwhile: Meanwhile | None = None) -> bool:
-        """Whether it is so; ``meanwhile`` is called again and again until the answer is there."""
+    def sees_current(self, phase: int, meanwhile: Meanwhile | None = None) -> bool:
+        """Whether the load of a phase (0 to 11) carries current now.
+
+        ``meanwhile`` is called again and again until the answer is there.
+        """
+        ...
+
+    def sees_enabled(self) -> bool:
+        """Whether the amplifiers show that they are enabled now."""
         ...
 
     def wait(self, seconds: float) -> float:
@@ -86,21 +87,30 @@ class Person:
         """See the protocol."""
         print(f'  {what.value} NOW', flush=True)
 
-    def sees(self, what: Sight, meanwhile: Meanwhile | None = None) -> bool:
-        """See the protocol; only a clear no is one, for that is what mostly passes."""
-        answer = ''
-        while answer not in ('y', 'yes', 'n', 'no'):
-            print(f'  {what.value} [y/n] ', end='', flush=True)
-            while meanwhile is not None and not select.select([sys.stdin], [], [], 0.0)[0]:
-                meanwhile()
-            answer = input().strip().lower()
-        return answer in ('y', 'yes')
+    def sees_current(self, phase: int, meanwhile: Meanwhile | None = None) -> bool:
+        """See the protocol."""
+        return _seen(f'does the load at {PHASE_NAMES[phase]} carry current now?', meanwhile)
+
+    def sees_enabled(self) -> bool:
+        """See the protocol."""
+        return _seen('do the amplifiers show that they are enabled now?')
 
     def wait(self, seconds: float) -> float:
         """See the protocol."""
         begun = time.monotonic()
         time.sleep(seconds)
         return time.monotonic() - begun
+
+
+def _seen(question: str, meanwhile: Meanwhile | None = None) -> bool:
+    """The answer; only a clear no is one, for that is what mostly passes."""
+    answer = ''
+    while answer not in ('y', 'yes', 'n', 'no'):
+        print(f'  {question} [y/n] ', end='', flush=True)
+        while meanwhile is not None and not select.select([sys.stdin], [], [], 0.0)[0]:
+            meanwhile()
+        answer = input().strip().lower()
+    return answer in ('y', 'yes')
 
 
 def _agreed(question: str) -> bool:
@@ -133,16 +143,19 @@ class EmulatedPerson:
         """See the protocol."""
         self.act(what)
 
-    def sees(self, what: Sight, meanwhile: Meanwhile | None = None) -> bool:
+    def sees_current(self, phase: int, meanwhile: Meanwhile | None = None) -> bool:
         """See the protocol."""
         if meanwhile is None:
             self.wait(self._response)
         else:
             for _ in range(round(self._response / self._boards.period)):
                 meanwhile()
-        if what is Sight.ENABLED:
-            return self._boards.lines.enabled
-        return bool(np.abs(self._boards.rig.phase_current[0]) > _A_CURRENT)
+        return bool(np.abs(self._boards.rig.phase_current[phase]) > _A_CURRENT)
+
+    def sees_enabled(self) -> bool:
+        """See the protocol."""
+        self.wait(self._response)
+        return self._boards.lines.enabled
 
     def wait(self, seconds: float) -> float:
         """See the protocol."""

@@ -1,23 +1,23 @@
 """The last line proven, before anything levitates: stop input, enable line, watchdog.
 
 With dummy loads in place of the motors, each of them does what it is there for while the operator
-looks at the load; the first that does not names the parameter that is wrong.
+looks at one load of each board; the first that does not names the parameter that is wrong.
 """
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
 from maglev_hw_bridge.amplifiers import Amplifiers
 from maglev_hw_bridge.drivers import Driver, SampledDriver, WatchdogError
-from maglev_hw_bridge.operators import Act, Operator, Sight
+from maglev_hw_bridge.operators import Act, Meanwhile, Operator
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_hw_bridge.signal_parameters import PHASES
+from maglev_hw_bridge.signal_parameters import PHASE_NAMES, PHASES
 
-_CURRENT = 0.5  # through the load [A]
+_CURRENT = 0.5  # through each load that is looked at [A]
 _FLOW = 0.5  # for so long, before the watchdog is let expire [s]
 _STRETCHED = 1.5  # of a wait, beyond which nothing is proven by it
 _PRESS = 15.0  # time to press the stop [s]
@@ -49,11 +49,14 @@ class Proof:
         self._amplifiers = amplifiers
         self._period = parameters.sample_time
         self._counts = np.zeros(6, dtype=np.int32)
+        board = parameters.amplifier.board
+        self._shown = (0, max(phase for phase in range(PHASES) if board[phase] != board[0]))
         self._current = np.zeros(PHASES)
-        self._current[0] = _CURRENT
+        self._current[list(self._shown)] = _CURRENT
 
     def run(self) -> None:
         """All steps that the parameters name lines for. Raises WrongError, DriverError."""
+        self._tell(f'  loads that show their current: at {_named(self._shown)}')
         self._operator.act(Act.LOADS)
         if self._boards.stop_input >= 0:
             self._stop_input()
@@ -113,28 +116,36 @@ class Proof:
         self._sample()
         refuse_pressed(self._driver)
 
+    def _flowing(self, meanwhile: Meanwhile | None = None) -> list[int]:
+        """The phases of the loads that carry current."""
+        return [p for p in self._shown if self._operator.sees_current(p, meanwhile)]
+
     def _enable_line(self) -> None:
         boards = self._boards
         with self._started():
-            enabled = self._operator.sees(Sight.CURRENT, self._drive)
+            enabled = self._flowing(self._drive)
+        still = _named(phase for phase in self._shown if phase not in enabled)
         if boards.enable_output < 0:
-            if not enabled:
-                raise WrongError('no current flows: check amplifier.board and channel, the supply')
+            if still:
+                raise WrongError(
+                    f'no current flows at {still}: check amplifier.board and channel, the supply'
+                )
             self._tell('  boards.enable_output is -1: there is no enable line to prove')
             return
         with self._started():
             self._driver.disable()
-            disabled = self._operator.sees(Sight.CURRENT, self._drive)
+            disabled = self._flowing(self._drive)
         line = f'boards.enable_output ({boards.enable_output})'
-        if disabled and not enabled:
+        if not set(disabled) <= set(enabled):
             raise WrongError(f'the enable line acts the wrong way round: see to {line} and '
                              f'boards.enable_level ({boards.enable_level}); what the amplifiers '
                              'need otherwise takes an inverter')  # fmt: skip
         if disabled:
-            raise WrongError(f'current flows whether enabled or not: {line} is another line')
-        if not enabled:
-            raise WrongError(f'no current flows even when enabled: {line} is another line, or the '
-                             'supply is off')  # fmt: skip
+            raise WrongError(f'current flows at {_named(disabled)} whether enabled or not: {line} '
+                             'is another line')  # fmt: skip
+        if still:
+            raise WrongError(f'no current flows at {still} even when enabled: {line} is another '
+                             'line, or the supply is off')  # fmt: skip
         self._tell('  enable line: current when enabled, none when disabled: pass')
 
     def _watchdog(self) -> None:
@@ -153,10 +164,12 @@ class Proof:
                     f'this machine took {waited:.3f} s for a wait of {longest:g} s, in which a '
                     'watchdog that is late expires too: free it of other load'
                 )
-            flows = self._operator.sees(Sight.CURRENT)
-            enabled = self._boards.enable_output >= 0 and self._operator.sees(Sight.ENABLED)
+            flows = self._flowing()
+            enabled = self._boards.enable_output >= 0 and self._operator.sees_enabled()
         if flows:
-            raise WrongError('current flows on after the watchdog expired: see to the boards')
+            raise WrongError(
+                f'current flows on at {_named(flows)} after the watchdog expired: see to the boards'
+            )
         if enabled:
             raise WrongError(
                 'the amplifiers are enabled after the watchdog expired: boards.enable_level, '
@@ -185,8 +198,12 @@ class Proof:
             if self._boards.enable_output < 0:  # then it is the commands alone that end it
                 self._current[:] = 0.0
                 self._amplifiers.cut()
-            flows = self._operator.sees(Sight.CURRENT, self._sample)
+            flows = self._flowing(self._sample)
         if flows:
-            raise WrongError('current flows on after an emergency stop')
+            raise WrongError(f'current flows on at {_named(flows)} after an emergency stop')
         self._operator.act(Act.RELEASE)
         self._tell('  emergency stop: no current: pass')
+
+
+def _named(phases: Iterable[int]) -> str:
+    return ' and '.join(PHASE_NAMES[phase] for phase in phases)
