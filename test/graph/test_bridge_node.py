@@ -274,6 +274,7 @@ def landed_softly(observer: Observer) -> bool:
         pytest.param((signal.SIGHUP,), marks=pytest.mark.long),
         pytest.param((signal.SIGINT, signal.SIGINT), marks=pytest.mark.long),
         (signal.SIGINT, signal.SIGTERM),
+        (signal.SIGTSTP,),
     ],
 )
 def test_stopped_in_flight_it_lands_first(

@@ -7,7 +7,7 @@ from maglev_node.executable import run_nodes
 
 def hw_bridge() -> None:
     """Entry point of the executable ``hw_bridge``."""
-    run_nodes('hw_bridge', 'maglev_hw_bridge.node:BridgeNode')
+    run_nodes('hw_bridge', 'maglev_hw_bridge.node:BridgeNode', suspends=False)
 
 
 if __name__ == '__main__':

@@ -9,18 +9,21 @@ from typing import Any
 from maglev_node import signals
 
 
-def run_nodes(name: str, *nodes: str | type[Any], background: bool = False) -> None:
+def run_nodes(
+    name: str, *nodes: str | type[Any], background: bool = False, suspends: bool = True
+) -> None:
     """Entry point of an executable: run its nodes and leave with their exit code.
 
     Each is a class, or ``package.module:Class``, which is then imported when the process is on the
     graph already. With ``--help`` or ``-h`` it only says what they are. Nodes in the background
     yield to those of the loop when they want the same core. Several are for what only watches:
     those of the loop take their real-time priority, and land, each in a process of its own.
+    What must not stand still is one that never ``suspends``: Ctrl-Z ends it, as Ctrl-C does.
     A signal while the rest is imported, for a third of a second, ends the nodes in order as soon as
     they are there.
     """
     asked = {'-h', '--help'} & set(sys.argv[1:])
-    caught = [] if asked else signals.listen()
+    caught = [] if asked else signals.listen(suspends)
     process = importlib.import_module('maglev_node.process')
     if asked:
         process.say_help(name, *nodes)

@@ -7,15 +7,18 @@ import signal
 _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU)
 
 
-def listen() -> list[int]:
-    """Where the numbers of signals are noted from now on; SIGHUP may be ignored, as by nohup."""
+def listen(suspends: bool = True) -> list[int]:
+    """Where the numbers of signals are noted from now on; SIGHUP may be ignored, as by nohup.
+
+    ``suspends``: Ctrl-Z, SIGTSTP, stops the process as it does any other, or else is one of them.
+    """
     caught: list[int] = []
 
     def catch(number: int, _frame: object) -> None:
         if number != signal.SIGXCPU or number not in caught:  # which comes every second
             caught.append(number)
 
-    for number in _ENDING:
+    for number in _ENDING if suspends else (*_ENDING, signal.SIGTSTP):
         if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, catch)
     return caught
