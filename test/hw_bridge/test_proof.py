@@ -10,56 +10,29 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from proving import LINES, nothing, prove
 
-from maglev_hw_bridge.amplifiers import Amplifiers
 from maglev_hw_bridge.drivers.emulated import EmulatedBoards
 from maglev_hw_bridge.drivers.quanser import QuanserDriver
 from maglev_hw_bridge.emulated_card import EmulatedCard
 from maglev_hw_bridge.memory import Memory
-from maglev_hw_bridge.operators import EmulatedPerson, Person
+from maglev_hw_bridge.operators import Person
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_hw_bridge.proof import Proof, WrongError
+from maglev_hw_bridge.proof import WrongError
 from maglev_model.parameters import build
-
-LINES = {'boards.stop_input': 0, 'boards.enable_output': 1}
-
-
-def prove(
-    claimed: dict[str, object],
-    spoil: Callable[[EmulatedBoards], None],
-    driver_type: type[QuanserDriver] = QuanserDriver,
-) -> list[str]:
-    """Prove the last line of a machine with both lines to one who takes a second to answer."""
-    parameters = build(BridgeParameters, {**LINES, **claimed})
-    boards = EmulatedBoards(parameters)
-    spoil(boards)
-    driver = driver_type(parameters, boards, boards.now, boards.sleep)
-    told: list[str] = []
-    driver.open()
-    try:
-        person = EmulatedPerson(boards, told.append, response=1.0)
-        Proof(parameters, driver, Amplifiers(parameters), person, told.append).run()
-    finally:
-        driver.close()
-        assert not np.any(boards.volts)
-    return told
-
-
-def nothing(_boards: EmulatedBoards) -> None:
-    """A machine that is right."""
 
 
 def test_the_last_line_is_proven() -> None:
-    where, *told = prove({}, nothing)
+    where, *told = prove({})
     assert where.endswith('at motor 1 phase a and motor 4 phase c')
     assert [line.split(':')[0].strip() for line in told] == [
         'stop input', 'enable line', 'watchdog', 'emergency stop',
     ]  # fmt: skip
     assert all(line.endswith('pass') for line in told)
-    _, *told = prove({'boards.stop_input': -1, 'boards.enable_output': -1}, nothing)
+    _, *told = prove({'boards.stop_input': -1, 'boards.enable_output': -1})
     assert 'no emergency stop to prove' in told[0]
     assert 'no enable line to prove' in told[1]
-    told = prove({'boards.enable_output': -1}, nothing)
+    told = prove({'boards.enable_output': -1})
     assert told[-1] == '  emergency stop: no current: pass'
 
 
@@ -75,7 +48,7 @@ def test_the_last_line_is_proven() -> None:
 )
 def test_a_last_line_that_is_wired_otherwise(claimed: dict[str, object], text: str) -> None:
     with pytest.raises(WrongError, match=text):
-        prove(claimed, nothing)
+        prove(claimed)
 
 
 def never_enabled(boards: EmulatedBoards) -> None:
@@ -144,7 +117,7 @@ def test_outputs_of_one_board_that_outlive_its_watchdog(
 
     monkeypatch.setattr(EmulatedCard, 'expire', hold)
     with pytest.raises(WrongError, match=f'current flows on at {LOADS[board]} after the watchdog'):
-        prove({'boards.enable_output': -1}, nothing)
+        prove({'boards.enable_output': -1})
 
 
 @pytest.mark.parametrize('boards', ['0', '1', '01'])
@@ -161,7 +134,7 @@ def test_a_watchdog_that_expires_late_or_never(
     monkeypatch.setattr(EmulatedCard, 'watchdog_start', start_late)
     named = f'watchdog of board {" and ".join(boards)} did not expire within 0.04 s'
     with pytest.raises(WrongError, match=re.escape(named)):
-        prove({}, nothing)
+        prove({})
 
 
 def stretched(boards: EmulatedBoards) -> None:
