@@ -81,13 +81,16 @@ def test_after_the_stop_current_is_asked_for_where_a_line_must_end_it(
     assert asked == pytest.approx(0.5, abs=0.01) if goes_on else not np.any(asked)
 
 
-@pytest.mark.parametrize('stays', [0, 1])
-def test_a_line_of_any_number_is_an_enable_line(stays: int) -> None:
+@pytest.mark.parametrize('line', [0, 1])
+def test_a_line_of_any_number_is_an_enable_line(line: int) -> None:
+    claimed: dict[str, object] = {'boards.enable_output': line, 'boards.stop_input': 2}
+    assert '  enable line: current when enabled, none when disabled: pass' in prove(claimed)
+
     def stay(boards: EmulatedBoards) -> None:
         boards.lines.let_go = lambda _expired: None  # type: ignore[method-assign]
 
     with pytest.raises(WrongError, match='enabled after the watchdog expired'):
-        prove({'boards.enable_output': stays, 'boards.stop_input': 2}, stay)
+        prove(claimed, stay)
 
 
 @pytest.mark.parametrize(

@@ -99,7 +99,6 @@ class Proof:
 
     @contextlib.contextmanager
     def _started(self) -> Iterator[None]:
-        self._amplifiers.cut()
         self._driver.start()
         try:
             yield
@@ -197,7 +196,6 @@ class Proof:
             self._driver.disable()
             if self._boards.enable_output < 0:  # then it is the commands alone that end it
                 self._current[:] = 0.0
-                self._amplifiers.cut()
             flows = self._flowing(self._sample)
         if flows:
             raise WrongError(f'current flows on at {_named(flows)} after an emergency stop')
