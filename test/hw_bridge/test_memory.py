@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +35,21 @@ def test_emulated_boards_keep_nothing_and_real_ones_a_file(
     assert memory_file(BridgeParameters()) is None
     real = memory_file(build(BridgeParameters, {'driver': 'quanser'}))
     assert real == tmp_path / 'maglev-stage' / 'q8-0-1.json'
+    monkeypatch.delenv('XDG_STATE_HOME')
+    monkeypatch.setenv('HOME', str(tmp_path))
+    named = {'driver': 'quanser', 'boards.identifier': ('usb/1', 'usb/2')}
+    real = memory_file(build(BridgeParameters, named))
+    assert real == tmp_path / '.local' / 'state' / 'maglev-stage' / 'q8-usb_1-usb_2.json'
+
+
+def test_without_a_file_nothing_is_kept() -> None:
+    memory = Memory(BridgeParameters())
+    memory.claim()
+    memory.keep(np.ones(12), Fault('stale', 'for a test', 'none', True), active=True)
+    memory.record_proof(BridgeParameters())
+    load, fault = memory.recall()
+    assert not np.any(load)
+    assert fault is None
 
 
 def test_load_and_fault_outlast_the_process(tmp_path: Path) -> None:
@@ -69,7 +86,8 @@ def test_what_is_killed_in_flight_is_a_fault_and_hot(tmp_path: Path) -> None:
     second.configure()
     assert second.fault is not None
     assert second.fault.kind == 'ended'
-    assert second.amplifiers.load > 0.9
+    assert second.fault.cut
+    assert second.amplifiers.load == 1.0
     assert 'hot' in second.reset()[1]
     assert cold(second).reset()[0]
     second.activate()
@@ -89,7 +107,8 @@ def test_a_damaged_file_is_a_fault_and_hot(tmp_path: Path, content: str | bytes)
     stage.configure()
     assert stage.fault is not None
     assert 'damaged' in stage.fault.reason
-    assert stage.amplifiers.load > 0.9
+    assert stage.fault.cut
+    assert stage.amplifiers.load == 1.0
     assert cold(stage).reset()[0]
     stage.close()
     assert json.loads(path.read_text())['fault'] is None
@@ -121,6 +140,74 @@ def test_a_fault_is_kept_as_it_was(tmp_path: Path) -> None:
     memory.keep(np.zeros(12), fault, active=False)
     assert memory.recall().fault == fault
     assert [path.name for path in tmp_path.iterdir()] == ['boards.json']
+
+
+def kept_in(path: Path) -> Memory:
+    return Memory(build(BridgeParameters, {'boards.memory': str(path)}))
+
+
+def test_the_boards_are_claimed_once_and_given_back(tmp_path: Path) -> None:
+    path = tmp_path / 'a' / 'b' / 'boards.json'
+    one, other = kept_in(path), kept_in(path)
+    one.claim()
+    one.claim()
+    with pytest.raises(StageError, match='in use'):
+        other.claim()
+    one.release()
+    other.claim()
+    with pytest.raises(StageError, match='in use'):
+        one.claim()
+    other.release()
+
+
+def test_on_a_full_disk_what_was_kept_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    memory = kept_in(tmp_path / 'boards.json')
+    memory.keep(np.full(12, 0.5), None, active=False)
+
+    def full(descriptor: int) -> None:
+        assert os.fstat(descriptor).st_size > 0  # all of it has left the process
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, 'fsync', full)
+    with pytest.raises(StageError, match='No space left'):
+        memory.keep(np.zeros(12), None, active=True)
+    assert memory.recall().load == pytest.approx(np.full(12, 0.5), abs=0.01)
+    assert [path.name for path in tmp_path.iterdir()] == ['boards.json']
+
+
+def with_lines(path: Path) -> BridgeParameters:
+    lines = {'boards.stop_input': 0, 'boards.enable_output': 1}
+    return build(BridgeParameters, {**lines, 'boards.memory': str(path)})
+
+
+@pytest.mark.parametrize(
+    'of',
+    [
+        *('type', 'watchdog', 'stop_input', 'stop_level', 'enable_output', 'enable_level'),
+        *('open_level', 'digital_expiry', 'analog_expiry'),
+    ],
+)
+def test_the_proof_is_recorded_and_holds_for_what_was_proven(tmp_path: Path, of: str) -> None:
+    parameters = with_lines(tmp_path / 'boards.json')
+    memory = Memory(parameters)
+    assert not memory.proven(parameters)
+    memory.record_proof(parameters)
+    assert memory.proven(parameters)
+    [recorded] = tmp_path.iterdir()
+    assert recorded.name == 'boards-proven.json'
+    content = json.loads(recorded.read_text())
+    assert content[of] == getattr(parameters.boards, of)
+    recorded.write_text(json.dumps({**content, of: 'another'}))
+    assert not memory.proven(parameters)
+
+
+def test_a_proof_that_cannot_be_recorded_is_said(tmp_path: Path) -> None:
+    (tmp_path / 'file').write_text('')
+    parameters = with_lines(tmp_path / 'file' / 'boards.json')
+    with pytest.raises(StageError, match=r"parameter 'boards\.memory'"):
+        Memory(parameters).record_proof(parameters)
 
 
 def test_two_bridges_cannot_have_the_same_boards(tmp_path: Path) -> None:

@@ -6,20 +6,16 @@ import functools
 import os
 import re
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
-from proving import LINES, nothing, prove
+from proving import nothing, prove
 
 from maglev_hw_bridge.drivers.emulated import EmulatedBoards
 from maglev_hw_bridge.drivers.quanser import QuanserDriver
 from maglev_hw_bridge.emulated_card import EmulatedCard
-from maglev_hw_bridge.memory import Memory
 from maglev_hw_bridge.operators import Person
-from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.proof import WrongError
-from maglev_model.parameters import build
 
 
 def test_the_last_line_is_proven() -> None:
@@ -186,13 +182,3 @@ def test_current_flows_on_until_somebody_answers_clearly(
         monkeypatch.setattr('sys.stdin', stdin)
         assert Person().sees_current(3, lambda: print(typed.pop(0), end='', file=keys)) == seen
     assert not typed
-
-
-def test_the_proof_is_recorded_and_holds_for_what_was_proven(tmp_path: Path) -> None:
-    given = {**LINES, 'boards.memory': str(tmp_path / 'boards.json')}
-    parameters = build(BridgeParameters, given)
-    memory = Memory(parameters)
-    assert not memory.proven(parameters)
-    memory.record_proof(parameters)
-    assert memory.proven(parameters)
-    assert not memory.proven(build(BridgeParameters, {**given, 'boards.enable_output': 2}))
