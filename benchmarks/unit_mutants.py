@@ -84,7 +84,6 @@ FLYING: dict[str, tuple[str, ...]] = {
         'what_a_life_leaves', 'homing', 'life_cycle', 'memory'
     ),
     'maglev_hw_bridge.memory': bridge_tests('memory'),
-    'maglev_hw_bridge.lift': bridge_tests('homing'),
     'maglev_hw_bridge.proof': bridge_tests('proof_in_turn', 'proof'),
     'maglev_hw_bridge.stage': bridge_tests(
         'stage_rest', 'stage_samples', 'stage_faults', 'what_a_life_leaves'
