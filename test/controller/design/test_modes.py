@@ -104,6 +104,15 @@ def test_without_modes_nothing_changes() -> None:
     assert plain.notches == ()
 
 
+@pytest.mark.parametrize('damping', [0.2, 0.25, 0.3, 1.0])
+def test_what_is_damped_well_leaves_the_margins(damping: float) -> None:
+    """However far below the mode its width would reach."""
+    found = Regulator(with_mode(400.0, 0.3, **{'modes.damping': (damping,)})).margins[1]
+    plain = Regulator(ControllerParameters()).margins[1]
+    for name in ('crossover', 'phase', 'gain_up', 'gain_down', 'sensitivity'):
+        assert getattr(found, name) == pytest.approx(getattr(plain, name), rel=0.02)
+
+
 @pytest.mark.parametrize(
     ('changes', 'reason'),
     [

@@ -113,7 +113,7 @@ def loop_margins(
     omega = np.geomspace(0.05, math.pi / period * (1.0 - 1e-9), _GRID)
     for mode in modes:
         near = mode.frequency * (1.0 + mode.damping * np.linspace(-5.0, 5.0, 101))
-        omega = np.union1d(omega, near[near < omega[-1]])
+        omega = np.union1d(omega, near[(near > omega[0]) & (near < omega[-1])])
     z = np.exp(1j * omega * period)
     loop = -response(controller, z) * response(plant, z)
     crossover, phase = _crossover(omega, loop)

@@ -36,6 +36,7 @@ FACTORS: Final = tuple(0.93**power for power in range(17))
 _PLACES = (0.75, 0.82, 0.88, 0.92, 0.96, 1.0, 1.04, 1.08, 1.13, 1.2, 1.35)  # of notch by mode
 _WIDTHS = (0.08, 0.16, 0.3, 0.5, 0.8)
 _DEPTH = 0.03
+_LOWEST = 1.0  # frequency looked at [rad/s]
 _POINTS = 200
 
 
@@ -90,12 +91,13 @@ class _Grid:
         self._variants = variants(case.modes, case.tolerance)
         period = case.period
         top = math.pi / period * (1.0 - 1e-6)
-        parts = [np.geomspace(1.0, top, _POINTS)]
+        parts = [np.geomspace(_LOWEST, top, _POINTS)]
         for mode in itertools.chain.from_iterable(self._variants):
             span = 4.0 * mode.damping
             parts.append(mode.frequency * np.linspace(1.0 - span, 1.0 + span, 21))
         omega = np.unique(np.concatenate(parts))
-        self._z: ComplexArray = np.exp(1j * omega[omega < top] * period)
+        within = (omega >= _LOWEST) & (omega < top)
+        self._z: ComplexArray = np.exp(1j * omega[within] * period)
 
     def fitted(self, design: AxisDesign) -> AxisDesign | None:
         """The design with notches for all modes, or None where the peak stays too high."""
