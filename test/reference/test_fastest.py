@@ -11,9 +11,10 @@ from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
 from maglev_model.axes import FloatArray
 from maglev_model.parameters import from_yaml, replace
+from maglev_model.phases import Phase
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
-from maglev_reference.check import utilisation
+from maglev_reference.check import UnreachableError, utilisation
 from maglev_reference.currents import current_utilisation, motor_currents
 from maglev_reference.fastest import Fastest
 from maglev_reference.motion import Kinematics
@@ -120,6 +121,19 @@ def test_the_voltage_makes_it_longer() -> None:
     assert within.duration > free.duration
 
 
+@pytest.mark.parametrize('name', MOVES)
+def test_a_low_voltage_is_kept_too(name: str) -> None:
+    bound = parameters(limits__voltage=6.0)
+    move = Fastest(*(np.array(end) for end in MOVES[name]), bound)
+    assert voltage_amplitudes(sampled(move), bound).max() <= 6.0
+
+
+def test_a_voltage_that_holding_takes_is_refused() -> None:
+    start, target = (np.array(end) for end in MOVES['y'])
+    with pytest.raises(UnreachableError, match=r'4\.51 V, .* at most 4 V \(limits\.voltage\)'):
+        Fastest(start, target, parameters(limits__voltage=4.0))
+
+
 def test_voltages_by_hand() -> None:
     """At rest R i; where only a gap's rate differs, the EMF of the magnets and L' i as well."""
     table = parameters()
@@ -141,3 +155,12 @@ def test_steps_and_waypoints_take_the_profile() -> None:
         block = timeline.block(measured.first, 400)
         moved = np.flatnonzero(np.abs(np.diff(block.position, axis=0)).max(axis=1) > 0.0)
         assert len(moved) * PERIOD < 0.125
+
+
+def test_a_step_of_no_way_stands() -> None:
+    still = {'steps__start': (0.022,), 'steps__target': (0.022,)}
+    timeline = Timeline(parameters(trajectory='steps', duration=0.5, **still))
+    (step,) = (each for each in timeline.segments if each.phase == Phase.STEP)
+    block = timeline.block(step.first, 500)
+    np.testing.assert_array_equal(block.position[:, 0], 0.022)
+    assert not block.velocity.any()

@@ -33,13 +33,13 @@ _HALVINGS = 24
 _ROUNDS = 3  # friction is that at the speed of the round before
 _SHARES = np.arange(0.9, 0.4, -0.02)
 _LONGER = 1.25  # from one smoothing to the next
-_SMOOTHINGS = 12
+_SMOOTHINGS = 24
 
 
 class Fastest:
     """The fastest move from ``start`` to ``target`` (5,) [m, rad]; it stays there.
 
-    Raises :class:`UnreachableError` where the platen cannot even be held.
+    Raises :class:`UnreachableError` where the platen cannot even be held, or the voltage not kept.
     """
 
     def __init__(
@@ -94,9 +94,16 @@ class Fastest:
                 )
                 if within(used):
                     break
-            if voltage_utilisation(samples, self._parameters) <= 1.0:
+            voltage = voltage_utilisation(samples, self._parameters)
+            if voltage <= 1.0:
                 return
-            self._mean *= _LONGER
+            smoothest, self._mean = self._mean, self._mean * _LONGER
+        limit = self._parameters.limits.voltage
+        raise UnreachableError(
+            f'unreachable reference: the move from {self._start.tolist()} by {self._way.tolist()} '
+            f'takes {voltage * limit:.3g} V, even where its acceleration turns in {smoothest:.2g} '
+            f's, it must take at most {limit:g} V (limits.voltage)'
+        )
 
     def _samples(self) -> Kinematics:
         step = self._parameters.sample_time

@@ -160,7 +160,7 @@ def steps(parameters: ReferenceParameters) -> list[Step]:
         before, after = home.copy(), home.copy()
         before[index], after[index] = start, target
         motion: Motion = Stand(after)
-        if table.shaped and table.profile == 'fastest':
+        if table.shaped and table.profile == 'fastest' and start != target:
             motion = Fastest(before, after, parameters)
         elif table.shaped:
             least = minimum_jerk_time(target - start, math.inf, table.acceleration[index])
