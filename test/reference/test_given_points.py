@@ -229,6 +229,21 @@ def test_it_is_followed_from_the_hover_and_hovers_where_it_ends() -> None:
     assert run.phase == Phase.END
 
 
+@pytest.mark.parametrize('length', [0.0103, 0.0107])
+def test_it_arrives_also_between_two_samples(length: float) -> None:
+    run = hovering()
+    run.propose(('x',), (Point(length, (1e-4,), (0.0,)),))
+    assert followed(run) == length
+    end = run.newest + run.ahead + 1 + 11
+    while run.newest + run.ahead < end:
+        run.observe(run.newest + 1)
+        due = run.due()
+    assert due is not None
+    assert due[0] <= end
+    assert due[1].position[end - due[0], 1] == 1e-4
+    assert not due[1].velocity[end - due[0]].any()
+
+
 def test_where_nothing_hovers_it_is_refused() -> None:
     run = ReferenceRun(PARAMETERS, 64, True)
     with pytest.raises(UnreachableError, match='there is no stage'):

@@ -5,6 +5,7 @@ It is checked like any other reference, but a piece at a time, because meanwhile
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -192,7 +193,7 @@ class Candidate:
 
     def __init__(self, motion: Through, hover: FloatArray, parameters: ReferenceParameters) -> None:
         self.motion, self.hover = motion, hover
-        self.samples = max(1, round(motion.length / parameters.sample_time))
+        self.samples = max(1, math.ceil(motion.length / parameters.sample_time - 1e-9))
         self._parameters = parameters
         self._checked = 0
 
