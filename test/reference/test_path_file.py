@@ -173,3 +173,17 @@ def test_a_file_out_of_range_is_refused_with_its_time(path):
     )
     with pytest.raises(ParameterError, match=r'x is -?0.05\d* m at \d+\.\d+ s'):
         Timeline(parameters)
+
+
+def test_what_was_checked_is_flown_whatever_becomes_of_the_file(path):
+    given = {'trajectory': 'file', 'file.path': str(write(path, rows())), 'duration': 2.5}
+    parameters = build(ReferenceParameters, {**given, 'file.repeat': True})
+    timeline = Timeline(parameters, autostart=False)
+    checked = Timeline(parameters).block(0, 20_000).position
+    table = rows()
+    table[:, 2] *= 1.6
+    write(path, table)
+    assert timeline.lift_off(0, checked[0])
+    np.testing.assert_array_equal(timeline.block(0, 20_000).position, checked)
+    path.unlink()
+    assert timeline.lift_off(20_000, checked[0])

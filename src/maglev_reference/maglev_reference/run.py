@@ -121,7 +121,7 @@ class ReferenceRun:
     def plan(self, rest: FloatArray) -> Timeline:
         """What to :meth:`start`, the platen at rest at ``rest`` (5,) [m, rad].
 
-        Takes its time, in which the stage goes on. Raises UnreachableError as :class:`Timeline`.
+        Takes its time, in which the stage goes on. Raises ParameterError as :class:`Timeline`.
         """
         return Timeline(self._parameters, rest, self.autostart)
 

@@ -15,7 +15,7 @@ from maglev_reference.check import utilisation, within
 from maglev_reference.currents import current_utilisation
 from maglev_reference.motion import Motion, Quintic, Stand, State, state_at
 from maglev_reference.parameters import ReferenceParameters
-from maglev_reference.trajectories import Delayed, course, steps
+from maglev_reference.trajectories import Course, Delayed, Step
 
 _STRETCH = 1.25  # from one tried move time to the next
 _TRIALS = 24
@@ -77,16 +77,16 @@ class Planner:
         self._move_to(home)
         self._stand(Phase.HOLD, table.settle)
 
-    def measure(self) -> None:
+    def measure(self, measured: Course | list[Step]) -> None:
         """The measured part: TRACK on the trajectory, or every STEP; then HOLD back at home."""
         parameters = self._parameters
-        if parameters.trajectory == 'steps':
-            for step in steps(parameters):
+        if isinstance(measured, list):
+            for step in measured:
                 self._move_to(step.start)
                 self._stand(Phase.HOLD, parameters.steps.settle)
                 self._follow(Phase.STEP, step.motion, parameters.duration, jumps=step.jumps)
         else:
-            path = course(parameters).motion
+            path = measured.motion
             run_in = self._samples(parameters.run_in) * parameters.sample_time
             self._move(Phase.HOLD, state_at(path, -run_in), parameters.move_time)
             if run_in > 0.0:

@@ -21,6 +21,7 @@ from maglev_reference.currents import check_currents
 from maglev_reference.motion import Kinematics, Motion, State, state_at
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.segments import Planner, Segment
+from maglev_reference.trajectories import course, steps
 
 _CHUNK = 256  # samples evaluated together, so that a value does not depend on who asks for how many
 _CHECKED_TOGETHER = 65536
@@ -64,8 +65,9 @@ class Timeline:
     """The reference at any sample n >= 0.
 
     ``rest`` (5,) is where the platen was found at rest; without it, the middle of the lower stop.
-    With ``autostart`` false it rests until :meth:`lift_off`. The whole reference is checked here,
-    before anything moves: raises UnreachableError (a ParameterError) where it leaves the limits.
+    With ``autostart`` false it rests until :meth:`lift_off`. The whole reference is made and
+    checked here, before anything moves: raises ParameterError for what cannot be made, as of a file
+    that is missing, and UnreachableError, which is one, where it leaves the limits.
     """
 
     def __init__(
@@ -76,6 +78,8 @@ class Timeline:
     ) -> None:
         self._parameters = parameters
         self._at_rest = State.at_rest(self._rest_position(rest))
+        make = steps if parameters.trajectory == 'steps' else course
+        self._measured = make(parameters)  # once: what was checked is what every lift-off flies
         self._cached_chunk = -1
         self._cache: Block | None = None
         planner = self._full_plan(self._at_rest, 0, 0)
@@ -214,7 +218,7 @@ class Timeline:
     def _full_plan(self, state: State, first: int, number: int) -> Planner:
         planner = Planner(self._parameters, first, number, state)
         planner.lift_off()
-        planner.measure()
+        planner.measure(self._measured)
         planner.land()
         return planner
 
