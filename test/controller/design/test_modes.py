@@ -104,11 +104,24 @@ def test_without_modes_nothing_changes() -> None:
     assert plain.notches == ()
 
 
+def test_a_mode_beyond_half_the_sample_rate_is_looked_for_where_it_shows() -> None:
+    """At 600 Hz it shows at 400 Hz."""
+    chosen = with_mode(600.0, 0.25, **{'modes.damping': (1e-3,), 'modes.tolerance': 0.0})
+    regulator = Regulator(chosen)
+    controller = controller_system(regulator.designs[0], PERIOD, 0)
+    plant = plant_system(PERIOD, modes=chosen.modes.of('y'))
+    z = np.exp(2j * math.pi * PERIOD * np.linspace(398.0, 402.0, 4001))
+    loop = -response(controller, z) * response(plant, z)
+    peak = float(np.max(1.0 / np.abs(1.0 + loop)))
+    assert regulator.margins[0].sensitivity == pytest.approx(max(peak, 1.6), rel=0.03)
+    assert peak < chosen.modes.sensitivity
+
+
 @pytest.mark.parametrize('damping', [0.2, 0.25, 0.3, 1.0])
 def test_what_is_damped_well_leaves_the_margins(damping: float) -> None:
     """However far below the mode its width would reach."""
-    found = Regulator(with_mode(400.0, 0.3, **{'modes.damping': (damping,)})).margins[1]
-    plain = Regulator(ControllerParameters()).margins[1]
+    found = Regulator(with_mode(400.0, 0.3, **{'modes.damping': (damping,)})).margins[0]
+    plain = Regulator(ControllerParameters()).margins[0]
     for name in ('crossover', 'phase', 'gain_up', 'gain_down', 'sensitivity'):
         assert getattr(found, name) == pytest.approx(getattr(plain, name), rel=0.02)
 

@@ -21,6 +21,7 @@ from maglev_controller.design.state_space import (
     closed_loop,
     plant_system,
     response,
+    sampled_frequency,
 )
 from maglev_controller.estimation import DOUBT
 from maglev_controller.parameters import ControllerParameters, MarginParameters
@@ -113,6 +114,7 @@ def loop_margins(
     omega = np.geomspace(0.05, math.pi / period * (1.0 - 1e-9), _GRID)
     for mode in modes:
         near = mode.frequency * (1.0 + mode.damping * np.linspace(-5.0, 5.0, 101))
+        near = sampled_frequency(near, period)
         omega = np.union1d(omega, near[(near > omega[0]) & (near < omega[-1])])
     z = np.exp(1j * omega * period)
     loop = -response(controller, z) * response(plant, z)

@@ -27,6 +27,7 @@ from maglev_controller.design.state_space import (
     closed_loop,
     plant_system,
     response,
+    sampled_frequency,
 )
 from maglev_model.axes import FloatArray
 
@@ -94,7 +95,8 @@ class _Grid:
         parts = [np.geomspace(_LOWEST, top, _POINTS)]
         for mode in itertools.chain.from_iterable(self._variants):
             span = 4.0 * mode.damping
-            parts.append(mode.frequency * np.linspace(1.0 - span, 1.0 + span, 21))
+            near = mode.frequency * np.linspace(1.0 - span, 1.0 + span, 21)
+            parts.append(sampled_frequency(near, period))
         omega = np.unique(np.concatenate(parts))
         within = (omega >= _LOWEST) & (omega < top)
         self._z: ComplexArray = np.exp(1j * omega[within] * period)

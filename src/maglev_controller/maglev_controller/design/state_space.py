@@ -68,6 +68,11 @@ class Mode(NamedTuple):
     gain: float  # κ, by the rigid axis' gain
 
 
+def sampled_frequency(frequency: FloatArray, period: float) -> FloatArray:
+    """Where a sample every ``period`` [s] shows each frequency (n,) [rad/s]: 0 to π / period."""
+    return np.asarray(np.abs(np.angle(np.exp(1j * period * frequency))) / period)
+
+
 def plant_system(
     period: float,
     delay: int = 0,
