@@ -12,7 +12,7 @@ import pytest
 
 from maglev_controller.design.axis_design import controller_system, resting
 from maglev_controller.design.margins import check_margins, loop_margins
-from maglev_controller.design.state_space import closed_loop, plant_system
+from maglev_controller.design.state_space import closed_loop, plant_system, response
 from maglev_controller.estimation import DOUBT
 from maglev_controller.laws.output_regulator import design as design_axis
 from maglev_controller.parameters import ControllerParameters
@@ -105,6 +105,20 @@ def test_margins_are_python_controls(chosen: ControllerParameters) -> None:
     omega = np.linspace(5.0, 3000.0, 8000)
     peak = np.max(1.0 / np.abs(1.0 + loop(np.exp(1j * PERIOD * omega))))
     assert found.sensitivity == pytest.approx(peak, rel=0.01)
+
+
+def test_narrow_peaks_are_found() -> None:
+    """Beside an oscillator above the crossover, which learns slowly."""
+    chosen = parameters(internal_model__fundamental=137.0, input_delay=1)
+    design = design_axis(chosen, 'y')
+    found = loop_margins(design, PERIOD, delay=1, designed=1)
+    z = np.exp(1j * PERIOD * 685.0 * (1.0 + np.linspace(-5e-3, 5e-3, 5001)))
+    loop = -response(controller_system(design, PERIOD, 1), z) * response(plant_system(PERIOD, 1), z)
+    peak = float(np.max(1.0 / np.abs(1.0 + loop)))
+    assert peak > 4.0
+    assert found.sensitivity == pytest.approx(peak, rel=0.01)
+    with pytest.raises(ParameterError, match=r'the phase margin is 1\d\.\d deg'):
+        check_margins(chosen, found, 'y')
 
 
 @pytest.mark.parametrize('slope', [10.0, 200.0, 1320.0, 1500.0])

@@ -21,7 +21,6 @@ from maglev_controller.design.state_space import (
     closed_loop,
     plant_system,
     response,
-    sampled_frequency,
 )
 from maglev_controller.estimation import DOUBT
 from maglev_controller.parameters import ControllerParameters, MarginParameters
@@ -29,6 +28,7 @@ from maglev_model.axes import AXES, FloatArray
 from maglev_model.parameters import ParameterError
 
 _GRID = 1500  # frequencies looked at
+_RINGING = 0.8  # |z| of a pole that may ring
 _SLOPES = tuple(np.geomspace(1.0, 1e6, 25))  # of friction against velocity [1/s]
 
 
@@ -111,17 +111,14 @@ def loop_margins(
     """
     controller = controller_system(design, period, designed)
     plant = plant_system(period, delay, stiffness=design.stiffness, modes=modes)
-    omega = np.geomspace(0.05, math.pi / period * (1.0 - 1e-9), _GRID)
-    for mode in modes:
-        near = mode.frequency * (1.0 + mode.damping * np.linspace(-5.0, 5.0, 101))
-        near = sampled_frequency(near, period)
-        omega = np.union1d(omega, near[(near > omega[0]) & (near < omega[-1])])
+    poles = np.linalg.eigvals(closed_loop(controller, plant)).astype(np.complex128)
+    omega = _frequencies(poles, period)
     z = np.exp(1j * omega * period)
     loop = -response(controller, z) * response(plant, z)
     crossover, phase = _crossover(omega, loop)
     up, down = _gain_margins(loop)
     return LoopMargins(
-        poles=np.asarray(np.linalg.eigvals(closed_loop(controller, plant)), dtype=np.complex128),
+        poles=poles,
         period=period,
         crossover=crossover,
         phase=phase,
@@ -130,6 +127,15 @@ def loop_margins(
         sensitivity=float(np.max(1.0 / np.abs(1.0 + loop))),
         friction=_friction(design, period, delay, designed) if design.fades else math.nan,
     )
+
+
+def _frequencies(poles: ComplexArray, period: float) -> FloatArray:
+    """Those looked at [rad/s]: all over, and around the closed loop's poles where it rings."""
+    omega = np.geomspace(0.05, math.pi / period * (1.0 - 1e-9), _GRID)
+    ringing = poles[np.abs(poles) > _RINGING]
+    width = np.abs(np.log(np.abs(ringing)))[:, None] * np.linspace(-5.0, 5.0, 101)
+    near = (np.angle(ringing)[:, None] + width).ravel() / period
+    return np.union1d(omega, near[(near > omega[0]) & (near < omega[-1])])
 
 
 def _crossover(omega: FloatArray, loop: ComplexArray) -> tuple[float, float]:
