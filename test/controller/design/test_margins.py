@@ -17,6 +17,7 @@ from maglev_controller.estimation import DOUBT
 from maglev_controller.laws.output_regulator import design as design_axis
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
+from maglev_model.axes import AXES
 from maglev_model.parameters import ParameterError, build, read_yaml, replace
 
 PARAMS = Path(__file__).resolve().parents[3] / 'params'
@@ -202,6 +203,17 @@ def test_what_falls_short_is_refused(overrides: dict[str, object], reason: str) 
             Regulator(parameters(**overrides, margins__override=True))
     else:
         Regulator(parameters(**overrides, margins__override=True))
+
+
+def test_what_is_too_ill_conditioned_is_refused() -> None:
+    chosen = parameters(
+        internal_model__form='companion',
+        **{f'{axis}__design': 'poles' for axis in AXES},
+        **{f'{axis}__poles_real': (-200.0,) * 13 for axis in AXES},
+        **{f'{axis}__poles_imaginary': (0.0,) * 13 for axis in AXES},
+    )
+    with pytest.raises(ParameterError, match=r'y: the loop .* is too ill-conditioned'):
+        Regulator(chosen)
 
 
 def test_an_axis_without_control_is_not_judged() -> None:

@@ -180,13 +180,23 @@ def _friction(design: AxisDesign, period: float, delay: int, designed: int) -> f
 def all_margins(
     parameters: ControllerParameters, designs: Sequence[AxisDesign]
 ) -> tuple[LoopMargins, ...]:
-    """The margins of all axes; of axes designed alike only once."""
+    """The margins of all axes; of axes designed alike only once.
+
+    Raises :class:`ParameterError` for a loop that double precision cannot hold.
+    """
     known: dict[object, LoopMargins] = {}
     given = [parameters.modes.of(axis) for axis in AXES]
     keys = [(_key(design), modes) for design, modes in zip(designs, given, strict=True)]
-    for key, design, modes in zip(keys, designs, given, strict=True):
-        if key not in known:
+    for axis, key, design, modes in zip(AXES, keys, designs, given, strict=True):
+        if key in known:
+            continue
+        try:
             known[key] = _worst(parameters, design, modes)
+        except np.linalg.LinAlgError as error:
+            raise ParameterError(
+                f'{axis}: the loop with these gains is too ill-conditioned for its margins '
+                f"({error}); of two forms of internal model 'modal' is the better conditioned"
+            ) from error
     return tuple(known[key] for key in keys)
 
 
