@@ -105,10 +105,22 @@ def test_a_jump_is_refused_unless_it_is_a_raw_step():
     samples = still()
     samples.position[4:, 1] = 0.01
     jumps = np.zeros(10, dtype=bool)
-    with pytest.raises(UnreachableError, match=r'x jumps by 0.01 m in one sample at 0.004 s'):
+    with pytest.raises(UnreachableError, match=r'x moves by 0.01 m in one sample at 0.004 s'):
         check_samples(samples, 0.0, PARAMETERS, jumps)
     jumps[4] = True
     check_samples(samples, 0.0, PARAMETERS, jumps)
+
+
+def test_a_velocity_that_is_none_of_its_position_is_refused():
+    time = 1e-3 * np.arange(2000)[:, None]
+    samples = still(2000)
+    samples.position[:, 2:3] += 0.03 * np.sin(2.0 * time)
+    samples.acceleration[:, 2:3] -= 0.12 * np.sin(2.0 * time)
+    samples.velocity[:, 2:3] += 0.06 * np.cos(2.0 * time)
+    check_samples(samples, 0.0, PARAMETERS)
+    samples.velocity[:, 2] *= -1.0
+    with pytest.raises(UnreachableError, match=r'z moves by \S+e-05 m .* makes -\S+e-05 m'):
+        check_samples(samples, 0.0, PARAMETERS)
 
 
 @pytest.mark.parametrize('axis', ['x', 'z', 'y', 'phi', 'theta'])

@@ -148,6 +148,11 @@ def test_it_is_checked_as_any_reference_is(point: Point, why: str) -> None:
     assert checked(through(Point(3.0, (0.03,)))) == 3
 
 
+def test_what_jumps_between_two_samples_is_refused() -> None:
+    with pytest.raises(UnreachableError, match=r'x moves by 0\.0009 m .* its velocity makes 0 m'):
+        checked(through(Point(0.1000002, (0.0,)), Point(0.1000004, (0.0009,))))
+
+
 def test_a_step_is_a_shaped_one() -> None:
     """As steps.* and limits.* say: 0.2 s, and longer where the acceleration would be too large."""
     motion = step('theta', -0.002, HOVER, PARAMETERS)

@@ -48,7 +48,7 @@ def check_samples(
     gaps = motor_gaps(samples.position, parameters.machine.radius)
     low, high = limits.motor_gap
     _within(gaps, np.full(4, low), np.full(4, high), time, _MOTORS, ('m',) * 4)
-    _check_slew(samples.position, time, parameters, jumps)
+    _check_jumps(samples, time, parameters, jumps)
 
 
 def check_locked(
@@ -143,22 +143,25 @@ def _within(
     )
 
 
-def _check_slew(
-    position: FloatArray,
+def _check_jumps(
+    samples: Kinematics,
     time: FloatArray,
     parameters: ReferenceParameters,
     jumps: npt.NDArray[np.bool_] | None,
 ) -> None:
-    change = np.diff(position, axis=0)
-    bound = np.array(parameters.limits.velocity) * parameters.sample_time
-    bad = np.abs(change) > bound * (1.0 + _SLACK) + 1e-12
+    """Refuse a way from sample to sample that no acceleration within limits makes of velocities."""
+    period, velocity = parameters.sample_time, samples.velocity
+    change = np.diff(samples.position, axis=0)
+    expected = 0.5 * period * (velocity[1:] + velocity[:-1])
+    bound = 0.25 * period**2 * np.array(parameters.limits.acceleration)
+    bad = np.abs(change - expected) > bound * (1.0 + _SLACK) + 1e-12
     if jumps is not None:
         bad &= ~jumps[1:, None]
     if not bad.any():
         return
     row, column = np.argwhere(bad)[0]
     raise UnreachableError(
-        f'unreachable reference: {AXES[column]} jumps by {change[row, column]:.6g} {UNITS[column]} '
-        f'in one sample at {time[row + 1]:.3f} s, it must stay within {bound[column]:g} '
-        f'{UNITS[column]}'
+        f'unreachable reference: {AXES[column]} moves by {change[row, column]:.6g} {UNITS[column]} '
+        f'in one sample at {time[row + 1]:.3f} s, where its velocity makes '
+        f'{expected[row, column]:.6g} {UNITS[column]}'
     )
