@@ -16,11 +16,12 @@ from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
 from maglev_reference.check import UnreachableError, utilisation
 from maglev_reference.currents import current_utilisation, motor_currents
-from maglev_reference.fastest import Fastest
+from maglev_reference.fastest import Fastest, FastestMoves
 from maglev_reference.motion import Kinematics
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.timeline import Timeline
 from maglev_reference.voltages import voltage_amplitudes
+from maglev_reference.waypoints import Waypoints
 from maglev_study.closed_loop import run
 from maglev_study.references import HOVER, References, held, joined
 from maglev_study.rough_flights import plant_of
@@ -164,3 +165,19 @@ def test_a_step_of_no_way_stands() -> None:
     block = timeline.block(step.first, 500)
     np.testing.assert_array_equal(block.position[:, 0], 0.022)
     assert not block.velocity.any()
+
+
+@pytest.mark.parametrize('repeat', [False, True])
+@pytest.mark.parametrize(
+    'x', [(0.0,), (0.0, 0.0, 0.01), (0.0, 0.01, 0.01, 0.0), (0.0, 0.01, 0.0, 0.0)]
+)
+def test_it_rests_at_every_waypoint(x: tuple[float, ...], repeat: bool) -> None:
+    """At one that is given twice, twice, as at any other profile's."""
+    still = {f'waypoints__{axis}': (0.0,) * len(x) for axis in ('z', 'phi', 'theta')}
+    given = {'waypoints__y': (0.025,) * len(x), 'waypoints__x': x, 'waypoints__repeat': repeat}
+    table = parameters(**still, **given, waypoints__dwell=0.5)
+    stood = []
+    for motion in (FastestMoves(table), Waypoints(table.waypoints, PERIOD)):
+        moved = motion.evaluate(np.arange(0.0, motion.length, PERIOD))
+        stood.append(int(np.sum(~moved.velocity.any(axis=1))))
+    assert stood[0] == pytest.approx(stood[1], abs=2 * len(x))

@@ -180,11 +180,12 @@ class FastestMoves:
         given, step = parameters.waypoints, parameters.sample_time
         points = list(np.array(given.points(), dtype=float).T)
         self.repeats = given.repeat
-        if self.repeats or len(points) == 1:
+        if len(points) == 1 or (self.repeats and (points[0] != points[-1]).any()):
             points.append(points[0])
-        pairs = [(a, b) for a, b in itertools.pairwise(points) if (a != b).any()]
-        self._moves: list[Motion] = [Fastest(a, b, parameters) for a, b in pairs]
-        self._moves = self._moves or [Stand(points[0])]
+        self._moves: list[Motion] = [
+            Fastest(a, b, parameters) if (a != b).any() else Stand(a)
+            for a, b in itertools.pairwise(points)
+        ]
         dwell = max(0, round(given.dwell / step))
         took = [
             math.ceil(move.duration / step - 1e-9) if isinstance(move, Fastest) else 1
