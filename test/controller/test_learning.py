@@ -61,6 +61,9 @@ def test_and_on_the_rough_one() -> None:
 # -- a pass at a time, with made-up samples --------------------------------------------------------
 
 
+AT_REST = (HOVER, np.zeros(5))
+
+
 def pass_by(
     learning: IterativeLearning, control: Regulator, disturbance: np.ndarray, factor: float = 1.0
 ) -> None:
@@ -70,7 +73,7 @@ def pass_by(
     """
     sample, axes = control.arrays.sample, control.arrays.axes
     for force in disturbance:
-        learning.look_ahead(control.arrays, True)
+        learning.look_ahead(control.arrays, True, *AT_REST)
         sample['error'][X] = factor * 1e-4 * (force + axes['learned'][X])
         sample['realised'][X] = -force
         learning.learn(control.arrays)
@@ -94,8 +97,35 @@ def test_a_repeated_force_is_learned() -> None:
     np.testing.assert_allclose(learning.table[:, X], -force, atol=0.03)
     assert not learning.table[:, [0, 2, 3, 4]].any()
     learning.rest()
-    learning.look_ahead(control.arrays, True)
+    learning.look_ahead(control.arrays, True, *AT_REST)
     assert abs(control.arrays.axes['learned'][X]) < 0.005
+
+
+@pytest.mark.parametrize('way', [[[0.0, 2e-6, 0.0, 0.0, 0.0]], [[0.0] * 5, [0.0, 0.0, 0.01, 0, 0]]])
+def test_a_reference_that_begins_elsewhere_is_fed_nothing(
+    way: list[list[float]], tmp_path: Path
+) -> None:
+    """Until it is the one to learn."""
+    learned, control, force = made_up()
+    for _ in range(4):
+        pass_by(learned, control, force, factor=0.0)
+    learned.rest()
+    learned.save(tmp_path / 'learned.npz')
+    loaded = made_up(**{'learning.file': str(tmp_path / 'learned.npz')})[0]
+    loaded.load(tmp_path / 'learned.npz')
+    other = np.array(AT_REST)
+    other[: len(way)] += way
+    for learning in (learned, loaded):
+        for measured in (True, True, False, True):
+            learning.look_ahead(control.arrays, measured, *other)
+            assert not np.any(control.arrays.axes['learned'])
+        learning.look_ahead(control.arrays, False, *AT_REST)
+        pass_by(learning, control, force[:350], factor=0.0)
+        assert abs(control.arrays.axes['learned'][X]) > 0.05
+        learning.rest()
+        learning.begin()
+        learning.look_ahead(control.arrays, True, *other)
+        assert learning.arrays.state['follows']
 
 
 @pytest.mark.parametrize(('growth', 'grew'), [(1.25, False), (1.4, True)])
@@ -109,7 +139,7 @@ def test_a_growing_error_brings_the_best_back(growth: float, grew: bool) -> None
     learning.arrays.state['floor'] = 0.0
     least = np.sqrt(learning.arrays.state['least'][0][X] / 400)
     for _ in range(400):
-        learning.look_ahead(control.arrays, True)
+        learning.look_ahead(control.arrays, True, *AT_REST)
         control.arrays.sample['error'][X] = growth * least  # of a whole pass
         learning.learn(control.arrays)
     assert (learning.arrays.state['stage'][0] == GREW) == grew
@@ -207,6 +237,12 @@ def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
         path.write_bytes(content)
         with pytest.raises(ParameterError, match=r'cannot read .*learned'):
             iterative_learning(build(ControllerParameters, {**SHORT, 'learning.file': str(path)}))
+    table = np.zeros((400, 5))
+    np.savez(path, sample_time=PERIOD, table=table, start=np.zeros(5))
+    with pytest.raises(ParameterError, match='does not say where its period begins'):
+        iterative_learning(build(ControllerParameters, {**SHORT, 'learning.file': str(path)}))
+    np.savez(path, sample_time=PERIOD, table=table)  # as was written before it said that
+    assert iterative_learning(build(ControllerParameters, {**SHORT, 'learning.file': str(path)}))
     np.savez(path, sample_time=PERIOD, table=np.full((400, 5), np.nan))
     with pytest.raises(ParameterError, match='not finite'):
         iterative_learning(build(ControllerParameters, {**SHORT, 'learning.file': str(path)}))

@@ -49,6 +49,7 @@ FADING_TIME = 0.3
 _REMEMBERED = (STATE.names or ())[(STATE.names or ()).index('stage') :]
 _WINDOW = 1.65  # half length of the filter by sample rate / (bandwidth / 2π)
 _WHOLE = 1e-6  # of a sample
+_SAME = np.array([[1e-6], [1e-4]])  # place and speed of a beginning [m, rad; m/s, rad/s]
 _LEAST = 0.25  # of a count: rms errors below it do not grow
 
 
@@ -68,6 +69,8 @@ class IterativeLearning:
         state['fading'] = -math.expm1(-self._sample_time / FADING_TIME)
         state['limit'] = np.where([a.controlled for a in parameters.axes], given.largest, 0.0)
         state['floor'] = samples * (_LEAST * _counts(parameters)) ** 2
+        self._start = np.zeros((0, 5))  # position and velocity where a period begins, once known
+        self._measured = self._repeats = False  # the last sample, what it belongs to
         self.arrays = LearningArrays(
             state=state,
             tables=np.zeros((TABLES, samples, 5)),
@@ -100,7 +103,9 @@ class IterativeLearning:
         return bool(self.arrays.state['stage'][0] == LEARNING)
 
     def begin(self) -> None:
-        """Learn over all passes again, from what is fed forward now."""
+        """Learn over all passes again, from what is fed forward now, or of what comes next."""
+        if not self._repeats:
+            self._start = np.zeros((0, 5))
         state = self.arrays.state
         state['stage'], state['waits'], state['recorded'] = LEARNING, True, 0
         state['flown'], state['score'], state['least'] = 0, math.inf, math.inf
@@ -116,6 +121,7 @@ class IterativeLearning:
 
     def rest(self) -> None:
         """Feed nothing forward, until the reference repeats again."""
+        self._measured = self._repeats = False
         state = self.arrays.state
         state['share'], state['follows'], state['recorded'], state['sum'] = 0.0, False, 0, 0.0
 
@@ -126,16 +132,31 @@ class IterativeLearning:
             successor.arrays.state[name] = self.arrays.state[name]
         successor.arrays.tables[:] = self.arrays.tables
         successor.arrays.history[:] = self.arrays.history
+        successor._start = self._start
         successor.rest()
         return successor
 
-    def look_ahead(self, control: ControlArrays, follows: bool) -> None:
+    def look_ahead(
+        self, control: ControlArrays, measured: bool, position: FloatArray, velocity: FloatArray
+    ) -> None:
         """Tell the regulator with these arrays what to feed forward at the sample that comes.
 
-        ``follows``: the sample belongs to the reference that repeats, its first one after others
-        begins a period.
+        ``measured``: the sample, at ``position`` and ``velocity`` (5,) [m, rad, 1/s], belongs to a
+        reference that is tracked, its first one after others begins a period. One that begins
+        elsewhere than what is learned is another, for which nothing is fed forward.
         """
-        look_ahead(self.arrays, control, follows)
+        if measured and not self._measured:
+            self._repeats = self._begins(position, velocity)
+        self._measured = measured
+        self._repeats = self._repeats and measured
+        look_ahead(self.arrays, control, self._repeats)
+
+    def _begins(self, position: FloatArray, velocity: FloatArray) -> bool:
+        """Whether what is learned begins so, which is known from the first time on."""
+        start = np.stack([position, velocity])
+        if not len(self._start):
+            self._start = start
+        return bool(np.all(np.abs(start - self._start) < _SAME))
 
     def learn(self, control: ControlArrays) -> None:
         """Take what the regulator with these arrays has made of the sample into account."""
@@ -158,7 +179,13 @@ class IterativeLearning:
         path = Path(path)
         partial = path.with_name(f'{path.name}.tmp')
         with partial.open('wb') as file:
-            np.savez(file, sample_time=self._sample_time, table=self.table, history=self.history)
+            np.savez(
+                file,
+                sample_time=self._sample_time,
+                table=self.table,
+                history=self.history,
+                start=self._start,
+            )
         os.replace(partial, path)
 
     def load(self, path: str | Path) -> None:
@@ -169,6 +196,7 @@ class IterativeLearning:
         try:
             with np.load(path, allow_pickle=False) as content:
                 sample_time, table = float(content['sample_time']), content['table']
+                start = content.get('start', self._start)
         except (OSError, EOFError, KeyError, ValueError, TypeError, BadZipFile) as error:
             text = f"parameter 'learning.file': cannot read {path}: {error}"
             raise ParameterError(text) from error
@@ -178,13 +206,16 @@ class IterativeLearning:
                 f"parameter 'learning.file': {path} holds {table.shape} values every "
                 f'{sample_time:g} s, the period is {wanted.shape} every {self._sample_time:g} s'
             )
+        if start.shape not in ((0, 5), (2, 5)) or start.dtype != np.float64:
+            text = f"parameter 'learning.file': {path} does not say where its period begins"
+            raise ParameterError(text)
         limit = self.arrays.state[0]['limit']
         if not (table.dtype == np.float64 and np.all(np.abs(table) <= limit)):
             raise ParameterError(
                 f"parameter 'learning.file': {path} holds what is not finite, or above "
                 f"'learning.largest' ({limit.tolist()})"
             )
-        wanted[:] = table
+        wanted[:], self._start = table, start
 
 
 def iterative_learning(parameters: ControllerParameters) -> IterativeLearning | None:

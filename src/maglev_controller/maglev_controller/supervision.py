@@ -303,10 +303,10 @@ class Supervisor:
         position: FloatArray,
         velocity: FloatArray,
         acceleration: FloatArray,
-        repeats: bool = False,
+        measured: bool = False,
     ) -> None:
         if self.learning is not None:
-            self.learning.look_ahead(self.regulator.arrays, repeats)
+            self.learning.look_ahead(self.regulator.arrays, measured, position, velocity)
         try:
             self.limited_by = self.regulator.step(
                 gap,
