@@ -239,6 +239,26 @@ def test_two_runs_lie_side_by_side(bag: Path, tmp_path: Path, capsys: Any) -> No
     assert not (tmp_path / 'metrics.json').exists()
 
 
+def test_two_unlike_runs_say_whose_errors_and_the_worse_verdict(
+    bag: Path, tmp_path: Path, run: Any, messages: dict[str, list[bytes]], encoder: Any
+) -> None:
+    """One simulated; one that failed on hardware, in a folder with an odd name."""
+    folder = tmp_path / 'a<b&c'
+    writer = open_bag(folder / 'bag')
+    for key in ('reference', 'measurement', 'currents'):
+        writer.write(TOPICS[key][0], zip(messages[key], run.stamp.tolist(), strict=True))
+    stamp = int(run.stamp[300])
+    writer.write('/diagnostics', [(encoder.diagnostic(stamp, 2, 'bridge', 'stop', {}), stamp)])
+    writer.close()
+    assert analyze([str(bag), str(folder), '--out', str(tmp_path)]) == NOT_PASSED
+    page = (tmp_path / 'two_runs.html').read_text(encoding='utf-8')
+    assert 'a&lt;b&amp;c, fail:' in page
+    assert 'a<b' not in page
+    assert '<span class="badge fail">fail</span>' in page
+    assert '<li>made_up, plant, lockstep, errors of the true position</li>' in page
+    assert '<li>errors of the measured position</li>' in page
+
+
 def test_a_second_run_that_cannot_be_read_is_one_line(
     bag: Path, tmp_path: Path, capsys: Any
 ) -> None:

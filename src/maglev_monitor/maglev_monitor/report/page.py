@@ -129,4 +129,4 @@ def bullets(title: str, lines: Sequence[str]) -> str:
     if not lines:
         return ''
     items = ''.join(f'<li>{html.escape(line)}</li>' for line in lines)
-    return f'<p class="note">{title}:</p><ul>{items}</ul>'
+    return f'<p class="note">{html.escape(title)}:</p><ul>{items}</ul>'

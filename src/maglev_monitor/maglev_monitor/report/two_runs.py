@@ -26,6 +26,7 @@ from maglev_monitor.report.page import bullets, header, html_table, page, write_
 from maglev_monitor.report.scales import FLOOR, units
 
 _COLOURS = (POSITION, ERROR)
+_FROM_BEST = ('pass', 'incomplete', 'fail')
 _FIGURES = (('mean_abs_error', 'mean |e|'), ('rms_error', 'rms e'), ('max_abs_error', 'max |e|'))
 
 
@@ -40,8 +41,7 @@ def render(names: Sequence[str], analyses: Sequence[Analysis]) -> str:
     :param names: what the two runs are called.
     :param analyses: of each run, in the same order.
     """
-    verdicts = [analysis.result['verdict'] for analysis in analyses]
-    verdict = verdicts[0] if len(set(verdicts)) == 1 else 'incomplete'
+    verdict = max((analysis.result['verdict'] for analysis in analyses), key=_FROM_BEST.index)
     parts = [header('Two runs', verdict, names)]
     for letter, name, analysis in zip('AB', names, analyses, strict=True):
         parts.append(bullets(f'{letter}: {name}, {analysis.result["verdict"]}', _facts(analysis)))
@@ -59,6 +59,7 @@ def _facts(analysis: Analysis) -> list[str]:
     """What a run was, and what it was told that the other may not have been."""
     result = analysis.result
     facts = [str(result[key]) for key in ('scenario', 'stage', 'mode') if result[key]]
+    facts.append(f'errors of the {result["error_source"]} position')
     return [', '.join(facts), *(f'{node}: {change}' for node, change in analysis.changes)]
 
 
