@@ -7,8 +7,10 @@ from typing import Any
 import control
 import numpy as np
 import pytest
+from run_figures import figures
 
 from maglev_model.parameters import build
+from maglev_monitor.metrics.decoding import Records
 from maglev_monitor.metrics.run_parameters import MetricsParameters
 from maglev_monitor.metrics.step_response import StepTracker
 
@@ -64,3 +66,16 @@ def test_settled_means_to_stay() -> None:
 def test_one_count_of_error_is_within_the_encoder_bound() -> None:
     found = step_result(np.full(300, 2701 * 1e-5), 0.020, 0.027)
     assert found['encoder_time'] == 0.0
+
+
+def test_a_step_that_began_before_the_recording_has_no_figures(
+    run: Any, records: dict[str, Records]
+) -> None:
+    """Where it started nobody knows, nor when."""
+    first = int(np.flatnonzero(run.segment == 3)[100])
+    shaped = records['reference'].copy()
+    shaped['position'][first : first + 50, 0] -= 1e-3
+    found = figures({**records, 'reference': shaped})
+    assert [step['axis'] for step in found['steps']] == ['y', 'theta']
+    late = {key: part[first:] for key, part in {**records, 'reference': shaped}.items()}
+    assert [step['axis'] for step in figures(late)['steps']] == ['theta']

@@ -134,10 +134,10 @@ class RunCurves:
     def _add_segment(self, rows: Records, values: FloatArray) -> None:
         segment = int(rows['segment'][0])
         if segment != self._segment:
-            target = np.array(rows['target'][0])
-            start = self._target if self._target is not None else np.array(rows['reference'][0])
+            start, target = self._target, np.array(rows['target'][0])
             self._segment, self._target, self._step = segment, target, None
-            if rows['phase'][0] == Phase.STEP and len(self.steps) < _MOST_STEPS:
+            steps = rows['phase'][0] == Phase.STEP and len(self.steps) < _MOST_STEPS
+            if steps and start is not None:
                 self._step = StepCurves(start, target)
                 self.steps.append(self._step)
         if self._step is not None:

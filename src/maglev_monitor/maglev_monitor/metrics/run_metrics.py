@@ -231,12 +231,12 @@ class RunMetrics:
                 self._step.add(part['sequence'], position[first:last])
 
     def _enter_segment(self, row: np.void) -> None:
-        target = np.array(row['target'])
-        start = self._target if self._target is not None else np.array(row['reference'])
+        """A step whose start is not known, since it began before the recording, is left out."""
+        start, target = self._target, np.array(row['target'])
         self._segment = int(row['segment'])
         self._target = target
         self._step = None
-        if row['phase'] == Phase.STEP and (target != start).any():
+        if row['phase'] == Phase.STEP and start is not None and (target != start).any():
             self._step = StepTracker(self._run.metrics, start, target, int(row['sequence']))
             self._steps.append(self._step)
 

@@ -133,8 +133,7 @@ def _steps(analysis: Analysis) -> Chart | None:
     stepped = [
         (index, step, next(figures, None))
         for step in analysis.curves.steps
-        for index in range(5)
-        if abs(step.target[index] - step.start[index]) > MOVES
+        for index in np.flatnonzero(step.target - step.start).tolist()
     ]
     if not stepped:
         return None
