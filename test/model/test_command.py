@@ -50,6 +50,11 @@ def test_who_leaves_early_ends_it_without_a_word(body: str) -> None:
     assert run(body, '| head -n 1') == (141, 'a line\n', '')
 
 
+def test_ctrl_c_ends_it_without_a_word() -> None:
+    body = 'import signal; signal.raise_signal(signal.SIGINT)'
+    assert run(body, '| cat') == (130, 'a line\n', '')
+
+
 def test_a_defect_shows() -> None:
     code, _, errors = run('1 / 0', '| cat')
     assert code == 1

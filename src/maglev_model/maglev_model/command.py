@@ -14,7 +14,7 @@ def leave_with(command: Callable[[], int]) -> NoReturn:
     """Run a command and leave the process with its exit code.
 
     When whoever reads the standard output has gone, as in ``command | head``, it ends as programs
-    that a broken pipe kills do: without a word, 128 + SIGPIPE to a shell.
+    that a broken pipe kills do: without a word, 128 + SIGPIPE to a shell; after a Ctrl-C likewise.
     """
     try:
         try:
@@ -24,6 +24,8 @@ def leave_with(command: Callable[[], int]) -> NoReturn:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = 128 + signal.SIGPIPE
+    except KeyboardInterrupt:
+        code = 128 + signal.SIGINT
     sys.exit(code)
 
 
