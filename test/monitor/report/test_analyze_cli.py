@@ -71,7 +71,10 @@ def test_report_is_self_contained(bag: Path, tmp_path: Path, capsys: Any) -> Non
 
 
 @pytest.mark.usefixtures('no_plots')
-def test_report_goes_beside_the_bag_and_keeps_the_live_metrics(bag: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize('name', ['.', 'bag', 'bag/bag_0.mcap', 'bag/metadata.yaml'])
+def test_report_goes_beside_the_bag_and_keeps_the_live_metrics(
+    name: str, bag: Path, tmp_path: Path
+) -> None:
     folder = tmp_path / 'run'
     shutil.copytree(bag, folder / 'bag')
     told = {'command': 'ellipse.sh --params=a&b.yaml', 'software': '7.1, abc-dirty'}
@@ -83,7 +86,7 @@ def test_report_goes_beside_the_bag_and_keeps_the_live_metrics(bag: Path, tmp_pa
     (folder / 'params').mkdir()
     lines = f'{DIFFERS}fan: 7 (by default 2)\n{DIFFERS}effective_parameters: no news\nplant:\n'
     (folder / 'params' / 'plant.yaml').write_text(lines)
-    assert analyze([str(folder / 'bag')]) == PASS
+    assert analyze([str(folder / name)]) == PASS
     page = (folder / 'report.html').read_text(encoding='utf-8')
     assert '<a href="replay.html">' in page
     assert 'Flown by ellipse.sh --params=a&amp;b.yaml on 20' in page
@@ -189,6 +192,40 @@ def test_faults_and_limits_of_the_monitor_are_in_the_bag(
     assert found['faults'] == ['plant: plant says']
     assert found['reasons'][0] == 'fault in plant: plant says'
     assert any('overshoot' in reason for reason in found['reasons'])
+
+
+@pytest.mark.usefixtures('no_plots')
+@pytest.mark.parametrize(
+    ('told', 'lost'),
+    [
+        ({'metrics.modules': ['nobody.knows'], 'scenario': 'known'}, 'further metrics'),
+        ({'limits.unheard_of': 1.0}, 'limits and parameters of the run'),
+    ],
+)
+def test_what_is_not_known_here_of_a_run_is_said_and_the_rest_reported(
+    told: dict[str, Any],
+    lost: str,
+    tmp_path: Path,
+    run: Any,
+    messages: dict[str, list[bytes]],
+    encoder: Any,
+    capsys: Any,
+) -> None:
+    """As of a bag from another machine, or by another version."""
+    stamp = int(run.stamp[0])
+    writer = open_bag(tmp_path / 'bag')
+    data = encoder.diagnostic(stamp, 0, 'monitor', 'ok', {'run': json.dumps(told)})
+    writer.write('/diagnostics', [(data, stamp)])
+    write_samples(writer, run, messages)
+    writer.close()
+    assert analyze([str(tmp_path)]) == BAD_BAG
+    captured = capsys.readouterr()
+    (line,) = captured.err.splitlines()
+    assert line.startswith(f'analyze: {lost}')
+    assert next(iter(told)) in line
+    assert 'verdict: pass' in captured.out
+    assert (told.get('scenario', 'run:')) in captured.out
+    assert lost in (tmp_path / 'report.html').read_text(encoding='utf-8')
 
 
 def test_parameters_survive_the_bag() -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from maglev_model.parameters import DIFFERS, ParameterError
 from maglev_model.progress import Progress
 from maglev_monitor.bag.errors import BagError
-from maglev_monitor.bag.reader import Bag
+from maglev_monitor.bag.reader import Bag, run_folder
 from maglev_monitor.metrics.curves import RunCurves
 from maglev_monitor.metrics.joiner import Joiner
 from maglev_monitor.metrics.run_metrics import RunMetrics
@@ -48,8 +48,14 @@ def analyse(path: Path, progress: Progress | None = None) -> Analysis:
     Raises :class:`~.errors.BagError` when there is no bag, or nothing of a run in it.
     """
     bag = Bag(path, progress)
-    run = run_parameters(bag)
-    metrics, curves, joiner = RunMetrics(run), RunCurves(run), Joiner()
+    run, notes = run_parameters(bag)
+    try:
+        metrics = RunMetrics(run)
+    except ParameterError as error:
+        notes.append(f'further metrics are left out: {error}')
+        run = dataclasses.replace(run, metrics=dataclasses.replace(run.metrics, modules=()))
+        metrics = RunMetrics(run)
+    curves, joiner = RunCurves(run), Joiner()
     for batch in bag.batches():
         for key, records in batch.samples.items():
             joiner.add(key, records)
@@ -62,10 +68,11 @@ def analyse(path: Path, progress: Progress | None = None) -> Analysis:
         curves.add(metrics.add(block))
     if not metrics.started:
         raise BagError(f"the bag '{bag.path}' holds no run: the reference never left REST")
-    notes, custom = list(bag.notes), bag.custom()
-    result = metrics.result(cut_off=bool(notes))
-    changes = _changes(bag.path.resolve().parent / 'params')
-    return Analysis(result, curves, run, metrics.tick_histogram, notes, changes, custom)
+    result = metrics.result(cut_off=bool(bag.notes))
+    changes = _changes(run_folder(path) / 'params')
+    return Analysis(
+        result, curves, run, metrics.tick_histogram, bag.notes + notes, changes, bag.custom()
+    )
 
 
 def _changes(folder: Path) -> list[tuple[str, str]]:
@@ -79,13 +86,19 @@ def _changes(folder: Path) -> list[tuple[str, str]]:
     return changes
 
 
-def run_parameters(bag: Bag) -> RunParameters:
-    """The parameters the monitor left in the bag; the defaults when there was no monitor."""
+def run_parameters(bag: Bag) -> tuple[RunParameters, list[str]]:
+    """The parameters the monitor left in the bag; the defaults when there was no monitor.
+
+    A note says so where they cannot be read.
+    """
+    notes: list[str] = []
     for batch in bag.batches():
         for status in batch.diagnostics:
             if RUN_KEY in status.values:
                 try:
-                    return run_from_json(status.values[RUN_KEY])
-                except ParameterError:
-                    continue
-    return RunParameters()
+                    return run_from_json(status.values[RUN_KEY]), []
+                except ParameterError as error:
+                    notes = [
+                        f'limits and parameters of the run are lost, defaults stand in: {error}'
+                    ]
+    return RunParameters(), notes

@@ -108,7 +108,7 @@ def table(path: str | Path, progress: Progress | None = None) -> Table:
     Raises :class:`~.errors.BagError` when there is no bag, or nothing of a run in it.
     """
     bag = Bag(Path(path), progress)
-    run = run_parameters(bag)
+    run, notes = run_parameters(bag)
     records = _records(bag)
     if not records:
         raise BagError(f"the bag '{bag.path}' holds no run: none of its topics")
@@ -132,7 +132,7 @@ def table(path: str | Path, progress: Progress | None = None) -> Table:
         named[column.name] = column.unit, column.description
     units = {name: unit for name, (unit, _) in named.items()}
     texts = {name: text for name, (_, text) in named.items()}
-    return Table(found, units, texts, tuple(bag.notes))
+    return Table(found, units, texts, (*bag.notes, *notes))
 
 
 def _records(bag: Bag) -> dict[str, Records]:

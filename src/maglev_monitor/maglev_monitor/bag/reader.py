@@ -66,8 +66,9 @@ class Bag:
 
     def custom(self) -> dict[str, str]:
         """What the bag says of itself besides, by name; nothing where it is cut off."""
+        folder = self.path.parent if self.path.is_file() else self.path
         try:
-            text = (self.path / 'metadata.yaml').read_text(encoding='utf-8', errors='replace')
+            text = (folder / 'metadata.yaml').read_text(encoding='utf-8', errors='replace')
             loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
             found = yaml.load(text, loader)['rosbag2_bagfile_information']['custom_data'] or {}
             return {str(name): str(value) for name, value in found.items() if value}

@@ -26,7 +26,7 @@ def analyze(arguments: Sequence[str] | None = None) -> int:
     """Run the command and return its exit code.
 
     0: every bag is whole and its run passed; 1: one did not pass or has not reached its end; 2: a
-    bag cannot be read, or is cut off (its report is written all the same).
+    bag cannot be read, or not all of it (its report is written all the same, and says so).
     """
     options = _parser().parse_args(arguments)
     bags: list[Path] = [options.bag, *([options.other] if options.other else [])]
