@@ -193,6 +193,16 @@ def test_a_fault_from_before_the_run_hides_none_of_the_run(
     assert found['reasons'] == ['fault in plant: spent']
 
 
+@pytest.mark.parametrize('count', [1, 600])
+def test_a_fault_from_before_the_run_is_none_of_it_where_the_first_measurements_are_lost(
+    count: int, run: Any, records: dict[str, Records]
+) -> None:
+    measured = records['measurement']
+    kept = {**records, 'measurement': np.delete(measured, np.arange(60, 60 + count))}
+    assert with_fault(int(run.stamp[30]), kept)['faults'] == []
+    assert with_fault(int(run.stamp[900]), kept)['faults'] == ['plant: spent']
+
+
 def with_fault(stamp: int, records: dict[str, Records], earlier: int | None = None) -> Any:
     metrics, joiner = RunMetrics(RUN), Joiner()
     if earlier is not None:

@@ -112,7 +112,6 @@ class RunMetrics:
                 return block[:0]
             self.started = True
             first = int(moving[0])
-            self._faults.begin(_instant(block[first]))
         else:
             self._skip(int(block['sequence'][0]))
         ends = np.flatnonzero(phases[first:] == Phase.END)
@@ -215,7 +214,11 @@ class RunMetrics:
         for metric in self._further.values():
             metric.add(rows, position)
         self._currents.add(rows)
-        self._timing.add(rows)
+        timed = rows[rows['has_measurement']]
+        if len(timed):
+            if self._timing.latest is None:
+                self._faults.begin(_instant(timed[0]))
+            self._timing.add(timed)
 
     def _add_segments(self, rows: Records, position: FloatArray) -> None:
         """Follow the set-points and feed the steps between them."""
@@ -344,9 +347,7 @@ class _Timing:
         """When the last sample was measured."""
 
     def add(self, rows: Records) -> None:
-        rows = rows[rows['has_measurement']]
-        if not len(rows):
-            return
+        """Take measured samples, at least one."""
         sequence, stamp = rows['sequence'], rows['stamp']
         if self._last is not None:
             sequence = np.concatenate([[self._last[0]], sequence])
