@@ -300,6 +300,22 @@ def test_kept_limits_pass_the_run(records: dict[str, Records]) -> None:
     assert found['limits']['max_mean_error'] == dict.fromkeys(AXES, 1e-2)
 
 
+def test_what_is_exactly_at_its_limit_keeps_it(run: Any, records: dict[str, Records]) -> None:
+    """A count beside 0.027 m is 1.00000000000003e-5 m, nine samples are 0.009000000000000001 s."""
+    plant, reference = records['plant'].copy(), records['reference'].copy()
+    reference['position'] = plant['state'][:, ::2] = run.target
+    reference['position'][run.phase == Phase.TRACK, 0] = 0.027
+    plant['state'][run.phase == Phase.TRACK, 0] = 2701 * 1e-5
+    for segment in (3, 4):
+        plant['state'][np.flatnonzero(run.segment == segment)[:9], ::2] -= 0.002
+    plant['own_length'] = np.nan
+    limits = with_limits(max_mean_error=(1e-5,) * 5, max_error=(1e-5,) * 5, max_settling_time=0.009)
+    found = figures({**records, 'plant': plant, 'reference': reference}, limits)
+    assert found['reasons'] == []
+    assert found['axes']['y']['max_abs_error'] > 1e-5
+    assert found['steps'][0]['settling_time'] > 0.009
+
+
 def without(records: dict[str, Records], *phases: Phase) -> dict[str, Records]:
     """The same run with some phases only held."""
     changed = copy.deepcopy(records)

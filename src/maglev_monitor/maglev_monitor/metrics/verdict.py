@@ -49,6 +49,11 @@ def checked_limits(limits: RunLimits) -> dict[str, Any]:
     return checked
 
 
+def _beyond(value: float, bound: float) -> bool:
+    """Whether a figure is above its limit, and not by its rounding."""
+    return value > bound * (1.0 + 1e-9) + 1e-12
+
+
 def _axis_reasons(figures: Mapping[str, Any], run: RunParameters) -> Iterator[str]:
     rows = (
         ('mean_abs_error', 'mean |e|', run.limits.max_mean_error),
@@ -62,7 +67,7 @@ def _axis_reasons(figures: Mapping[str, Any], run: RunParameters) -> Iterator[st
             value, bound = axes[axis][name], given + 0.5 * count * counts
             if not tracked and figures['steps']:
                 continue  # a run of steps tracks nothing
-            if given < 0 or (value is not None and value <= bound):
+            if given < 0 or (value is not None and not _beyond(value, bound)):
                 continue
             if value is None:
                 why = 'its gaps cannot be' if tracked else 'no tracking'
@@ -77,7 +82,7 @@ def _step_reasons(figures: Mapping[str, Any], limits: RunLimits) -> Iterator[str
         axis = step['axis']
         start, target = angle_or_length(axis, step['from']), angle_or_length(axis, step['to'])
         name = f'step of {axis} from {start} to {target}'
-        if 0 <= limits.max_overshoot < step['overshoot_percent']:
+        if limits.max_overshoot >= 0 and _beyond(step['overshoot_percent'], limits.max_overshoot):
             overshoot, allowed = number(step['overshoot_percent']), number(limits.max_overshoot)
             yield f'{name}: overshoot is {overshoot} %, allowed is {allowed} %'
         for key, symbol, bound in (
@@ -85,7 +90,7 @@ def _step_reasons(figures: Mapping[str, Any], limits: RunLimits) -> Iterator[str
             ('encoder_time', 't_enc', limits.max_encoder_time),
         ):
             value = step[key]
-            if bound < 0 or (value is not None and value <= bound):
+            if bound < 0 or (value is not None and not _beyond(value, bound)):
                 continue
             shown = f'{number(value)} s' if value is not None else 'never reached'
             yield f'{name}: {symbol} is {shown}, allowed is {number(bound)} s'
@@ -101,7 +106,7 @@ def _other_reasons(figures: Mapping[str, Any], limits: RunLimits) -> Iterator[st
         ('number of late samples', figures['timing']['late_samples'], limits.max_late_samples, ''),
     )
     for title, value, bound, unit in upper:
-        if bound >= 0 and value > bound * (1.0 + 1e-9):
+        if bound >= 0 and _beyond(value, bound):
             where = f': {holes(figures["holes"])}' if title == _MISSING else ''
             yield f'{title} is {number(value)}{unit}, allowed is {number(bound)}{unit}{where}'
     lower = (
