@@ -20,6 +20,7 @@ from maglev_model.paper import SCENARIOS, STEPS, TRACKING, WINDOW, PublishedStep
 from maglev_monitor.bag.analysis import Analysis, analyse
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.metrics.readable import angle_or_length, micro, seconds
+from maglev_monitor.metrics.result_file import write_whole
 
 ELLIPSES = tuple(TRACKING)
 CASES: Mapping[str, tuple[str, tuple[str, ...]]] = {
@@ -210,11 +211,8 @@ def _error(message: str) -> int:
 
 
 def _write(out: Path, runs: Sequence[Run], text: str) -> None:
-    from maglev_monitor.report.page import write_page  # matplotlib takes a second to load
-
-    out.mkdir(parents=True, exist_ok=True)
-    write_page(out / 'paper_tables.md', text)
-    write_page(out / 'paper_tables.html', render(runs))
+    write_whole(out / 'paper_tables.md', text)
+    write_whole(out / 'paper_tables.html', render(runs))
 
 
 def _failure(result: Mapping[str, Any]) -> str:

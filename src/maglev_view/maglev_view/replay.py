@@ -23,7 +23,8 @@ from maglev_monitor.bag.analysis import Analysis, analyse
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.reader import run_folder
 from maglev_monitor.metrics.curves import COLUMNS
-from maglev_monitor.report.page import REPLAY, write_page
+from maglev_monitor.metrics.result_file import write_whole
+from maglev_monitor.report.page import REPLAY
 from maglev_view.frames import Vector, platen_pose
 
 MAGNIFIED = 10.0
@@ -82,7 +83,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
         return _refuse(_MISSING, NO_VISER)
     page = (given.out or run_folder(given.bag)) / REPLAY
     try:
-        write_page(page, replay(analyse(given.bag, Progress('replay', '%', lines=False))))
+        write_whole(page, replay(analyse(given.bag, Progress('replay', '%', lines=False))))
     except BagError as error:
         return _refuse(str(error))
     except OSError as error:

@@ -6,6 +6,7 @@ import html
 import json
 import math
 import re
+import resource
 import shutil
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from maglev_monitor.bag.analysis import analyse
 from maglev_monitor.bag.export_cli import DONE, export
 from maglev_monitor.metrics.decoding import decode
 from maglev_monitor.metrics.joiner import Joiner
-from maglev_monitor.metrics.result_file import write_metrics
+from maglev_monitor.metrics.result_file import write_metrics, write_whole
 from maglev_monitor.metrics.run_metrics import RunMetrics
 from maglev_monitor.metrics.run_parameters import RunParameters, run_from_json, run_to_json
 from maglev_monitor.report import run_report
@@ -259,6 +260,17 @@ def test_metrics_are_written_whole_or_not_at_all(
     assert json.loads(path.read_text()) == {'verdict': 'pass'}
     write_metrics(path, {'rms': [1.0, math.nan], 'timing': {'tick': math.inf}})
     assert json.loads(path.read_text()) == {'rms': [1.0, None], 'timing': {'tick': None}}
+
+
+def test_a_page_that_does_not_fit_the_disk_leaves_nothing_there(tmp_path: Path) -> None:
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, limits[1]))
+    try:
+        with pytest.raises(OSError, match='File too large'):
+            write_whole(tmp_path / 'report.html', 'x' * 100_000)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert not list(tmp_path.iterdir())
 
 
 def test_two_runs_lie_side_by_side(bag: Path, tmp_path: Path, capsys: Any) -> None:

@@ -1,25 +1,31 @@
-"""``metrics.json``, the figures of a run. No ROS here."""
+"""Files that are there as a whole or not at all, ``metrics.json`` among them. No ROS here."""
 
 from __future__ import annotations
 
 import json
 import math
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 
 def write_metrics(path: Path, result: Mapping[str, Any]) -> None:
-    """Write ``metrics.json`` in one go: the file is either whole or not there. Raises OSError.
+    """Write ``metrics.json``, as :func:`write_whole`.
 
     JSON has no word for what is no finite number: that is ``null``, as what is not known.
     """
+    write_whole(path, json.dumps(_finite(result), indent=2, allow_nan=False) + '\n')
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a file, in a folder that may be new, in one go: all of it or none. Raises OSError."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(path.name + '.tmp')
-    text = json.dumps(_finite(result), indent=2, allow_nan=False)
-    temporary.write_text(text + '\n', encoding='utf-8')
-    os.replace(temporary, path)
+    partial = path.with_name(path.name + '.tmp')
+    try:
+        partial.write_text(text, encoding='utf-8')
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
 
 
 def _finite(content: Any) -> Any:

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import base64
 import html
-import os
 from collections.abc import Iterable, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -87,14 +85,6 @@ def page(title: str, parts: Iterable[str]) -> str:
         f'<title>{html.escape(title)} — maglev stage</title><style>{_CSS}</style></head><body>'
     )
     return '\n'.join([head, *(part for part in parts if part), _FIT_PAPER, '</body></html>\n'])
-
-
-def write_page(path: Path, text: str) -> None:
-    """Write a file in one go. Raises OSError when the folder cannot be written."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(path.name + '.tmp')
-    temporary.write_text(text, encoding='utf-8')
-    os.replace(temporary, path)
 
 
 def header(title: str, verdict: str, words: Iterable[str]) -> str:

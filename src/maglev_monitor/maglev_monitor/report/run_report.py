@@ -18,10 +18,11 @@ from maglev_monitor.metrics.readable import (
     number,
     saturation,
 )
+from maglev_monitor.metrics.result_file import write_whole
 from maglev_monitor.metrics.run_parameters import RunLimits
 from maglev_monitor.report import tables
 from maglev_monitor.report.chart import render as render_charts
-from maglev_monitor.report.page import REPLAY, bullets, header, html_table, page, write_page
+from maglev_monitor.report.page import REPLAY, bullets, header, html_table, page
 from maglev_monitor.report.published import published_step, published_tracking
 from maglev_monitor.report.run_charts import charts
 
@@ -32,7 +33,7 @@ _LIMITS = specs(RunLimits)
 def write_report(path: Path, analysis: Analysis) -> None:
     """Write ``report.html`` in one go. Raises OSError when the folder cannot be written."""
     replay = REPLAY if (path.parent / REPLAY).is_file() else ''
-    write_page(path, render(analysis, replay))
+    write_whole(path, render(analysis, replay))
 
 
 def render(analysis: Analysis, replay: str = '') -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from maglev_model.axes import AXES
 from maglev_monitor.bag.analysis import Analysis
 from maglev_monitor.metrics.readable import angle_or_length, micro, seconds
+from maglev_monitor.metrics.result_file import write_whole
 from maglev_monitor.report.chart import (
     ERROR,
     POSITION,
@@ -22,7 +23,7 @@ from maglev_monitor.report.chart import (
     magnitude,
 )
 from maglev_monitor.report.chart import render as render_charts
-from maglev_monitor.report.page import bullets, header, html_table, page, write_page
+from maglev_monitor.report.page import bullets, header, html_table, page
 from maglev_monitor.report.scales import FLOOR, units
 
 _COLOURS = (POSITION, ERROR)
@@ -32,7 +33,7 @@ _FIGURES = (('mean_abs_error', 'mean |e|'), ('rms_error', 'rms e'), ('max_abs_er
 
 def write_two_runs(path: Path, names: Sequence[str], analyses: Sequence[Analysis]) -> None:
     """Write the page in one go. Raises OSError when the folder cannot be written."""
-    write_page(path, render(names, analyses))
+    write_whole(path, render(names, analyses))
 
 
 def render(names: Sequence[str], analyses: Sequence[Analysis]) -> str:

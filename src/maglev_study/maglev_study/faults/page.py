@@ -85,15 +85,15 @@ def write(
     complete: bool,
 ) -> Path:
     """Write the page, and failures as runs to replay. Raises OSError when that cannot be."""
-    from maglev_monitor.report.page import write_page
+    from maglev_monitor.metrics.result_file import write_whole
 
     failures = [
         {**to_json(one.run), 'broken': [list(broken) for broken in one.verdict.violations]}
         for one in [*(after for _, after in shrunk), *tally.failures]
     ]
-    write_page(folder / 'failures.json', json.dumps(failures, indent=1) + '\n')
+    write_whole(folder / 'failures.json', json.dumps(failures, indent=1) + '\n')
     path = folder / 'faults.html'
-    write_page(path, render(tally, shrunk, words, complete))
+    write_whole(path, render(tally, shrunk, words, complete))
     return path
 
 

@@ -69,9 +69,9 @@ def draw(record: Record) -> str:
 
 def write(record: Record, path: Path) -> None:
     """Write the page. Raises OSError when that cannot be."""
-    from maglev_monitor.report.page import write_page
+    from maglev_monitor.metrics.result_file import write_whole
 
-    write_page(path, draw(record))
+    write_whole(path, draw(record))
 
 
 def _plot(record: Record):  # type: ignore[no-untyped-def]

@@ -134,7 +134,7 @@ def _leave(
     unknown: str,
 ) -> list[Path]:
     """Write table and page; their paths."""
-    from maglev_monitor.report.page import write_page
+    from maglev_monitor.metrics.result_file import write_whole
     from maglev_study.robustness.page import render
     from maglev_study.robustness.table import write_table
 
@@ -147,7 +147,7 @@ def _leave(
     if note:
         print(f'robustness: csv in place of parquet: {note}')
     path = options.out / 'robustness.html'
-    write_page(path, render(campaign, words, _replays(plan, options), guaranteed, unknown))
+    write_whole(path, render(campaign, words, _replays(plan, options), guaranteed, unknown))
     return [path, table]
 
 
@@ -172,7 +172,7 @@ def _named(path: Path, params: Path) -> str:
 
 def _write_machine(plan: Plan, number: int, out: Path) -> tuple[int, dict[str, Any]]:
     from maglev_model.parameters import to_yaml
-    from maglev_monitor.report.page import write_page
+    from maglev_monitor.metrics.result_file import write_whole
 
     if len(plan.contestants) != 1:
         raise ParameterError('--replay flies under one --law')
@@ -180,7 +180,7 @@ def _write_machine(plan: Plan, number: int, out: Path) -> tuple[int, dict[str, A
     drawn = plan.draw(contestant, number)
     path = out / f'machine-{number}.yaml'
     tables = to_yaml(drawn.plant, 'plant'), to_yaml(contestant.controller, 'controller')
-    write_page(path, f'# Machine {number} of seed {plan.seed}, law {contestant.name}\n')
+    write_whole(path, f'# Machine {number} of seed {plan.seed}, law {contestant.name}\n')
     with path.open('a', encoding='utf-8') as file:
         file.writelines(tables)
     print(f'machine {number}: {path}')
