@@ -5,22 +5,26 @@ from __future__ import annotations
 import builtins
 import csv
 import re
+import struct
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from made_up_run import TOPICS, open_bag
+from run_figures import figures
 from scipy.io import loadmat
 
 import maglev_monitor
 from maglev_model.axes import AXES
 from maglev_model.optional import MissingLibraryError
 from maglev_model.progress import Progress
+from maglev_monitor.bag.analysis import analyse
 from maglev_monitor.bag.columns import COLUMNS, FIRST, NONE, Table, table
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.export import FORMATS, write
 from maglev_monitor.bag.export_cli import DONE, FAILED, export
+from maglev_monitor.metrics.decoding import decode
 
 PAGE = Path(__file__).resolve().parents[3] / 'docs' / 'data.md'
 NAMES = [name for name, _, _ in FIRST] + [column.name for column in COLUMNS]
@@ -89,6 +93,25 @@ def test_what_a_bag_does_not_hold(
     assert np.flatnonzero(found['late_samples'] == NONE).tolist() == [70]
     assert np.flatnonzero(np.isnan(found['measured_y'])).tolist() == [70]
     assert not np.isnan(found['error_y']).any()
+
+
+def test_a_bag_without_a_monitor_goes_by_the_time_of_the_stage(
+    tmp_path: Path, run: Any, messages: dict[str, list[bytes]]
+) -> None:
+    """300 Hz, of a stage that was taken down for ten seconds."""
+    period, pause = 3_333_333, 10_000_000_000
+    writer = open_bag(tmp_path / 'bag')
+    for key, part in messages.items():
+        for n, data in enumerate(part):
+            stamp = divmod(int(run.stamp[0]) + n * period + pause * (n > 700), 1_000_000_000)
+            stamped = data[:4] + struct.pack('<iI', *stamp) + data[12:]
+            writer.write(TOPICS[key][0], [(stamped, int(run.stamp[n]))])
+    writer.close()
+    assert table(tmp_path).columns['time'][-1] == pytest.approx(1e-9 * period * (len(run) - 1))
+    steps, slower = analyse(tmp_path).result['steps'], 1e-6 * period
+    usual = figures({key: decode(key, part) for key, part in messages.items()})['steps']
+    for found, wanted in zip(steps, usual, strict=True):
+        assert found['settling_time'] == pytest.approx(slower * wanted['settling_time'])
 
 
 def test_what_is_no_run_is_refused(tmp_path: Path, capsys: Any) -> None:

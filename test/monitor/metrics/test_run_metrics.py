@@ -238,6 +238,8 @@ def test_figures_are_those_of_former_messages(run: Any, records: dict[str, Recor
     assert found['currents'].pop('saturated_by') == {'current': 0, 'levitation': 0}
     wanted = figures(records)
     del wanted['currents']['saturated_by']
+    assert found['timing'].pop('sample_time') is None  # their clock is the wall's
+    assert wanted['timing'].pop('sample_time') == 1e-3
     assert found.pop('own_axes') is found.pop('own_steps') is None
     assert wanted.pop('own_axes')['x']['bias'] != wanted.pop('own_steps')
     assert found == wanted
@@ -298,6 +300,16 @@ def test_kept_limits_pass_the_run(records: dict[str, Records]) -> None:
     assert found['verdict'] == 'pass'
     assert found['reasons'] == []
     assert found['limits']['max_mean_error'] == dict.fromkeys(AXES, 1e-2)
+
+
+def test_a_monitor_that_knows_another_sample_time_than_the_stage_fails_the_run(
+    records: dict[str, Records],
+) -> None:
+    found = figures(records, build(RunParameters, {'metrics.sample_time': 2e-3}), burst=70)
+    (reason,) = found['reasons']
+    assert reason.startswith('the stage samples every 1 ms, but metrics.sample_time is 2 ms')
+    assert found['verdict'] == 'fail'
+    assert figures(records)['verdict'] == 'pass'
 
 
 def test_what_is_exactly_at_its_limit_keeps_it(run: Any, records: dict[str, Records]) -> None:

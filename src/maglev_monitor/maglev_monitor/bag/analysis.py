@@ -14,6 +14,7 @@ from maglev_model.progress import Progress
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.reader import Bag, run_folder
 from maglev_monitor.metrics.curves import RunCurves
+from maglev_monitor.metrics.decoding import stage_period
 from maglev_monitor.metrics.joiner import Joiner
 from maglev_monitor.metrics.run_metrics import RunMetrics
 from maglev_monitor.metrics.run_parameters import (
@@ -87,12 +88,15 @@ def _changes(folder: Path) -> list[tuple[str, str]]:
 
 
 def run_parameters(bag: Bag) -> tuple[RunParameters, list[str]]:
-    """The parameters the monitor left in the bag; the defaults when there was no monitor.
+    """The parameters the monitor left in the bag; without a monitor the defaults.
 
-    A note says so where they cannot be read.
+    The sample time then is the stage's. A note says so where they cannot be read.
     """
     notes: list[str] = []
+    period: float | None = None
     for batch in bag.batches():
+        if period is None and 'measurement' in batch.samples:
+            period = stage_period(batch.samples['measurement'])
         for status in batch.diagnostics:
             if RUN_KEY in status.values:
                 try:
@@ -101,4 +105,6 @@ def run_parameters(bag: Bag) -> tuple[RunParameters, list[str]]:
                     notes = [
                         f'limits and parameters of the run are lost, defaults stand in: {error}'
                     ]
-    return RunParameters(), notes
+    run = RunParameters()
+    metrics = dataclasses.replace(run.metrics, sample_time=period or run.metrics.sample_time)
+    return dataclasses.replace(run, metrics=metrics), notes

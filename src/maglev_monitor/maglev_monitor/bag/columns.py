@@ -19,7 +19,7 @@ from maglev_model.progress import Progress
 from maglev_monitor.bag.analysis import run_parameters
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.reader import Bag
-from maglev_monitor.metrics.decoding import Records, stamps
+from maglev_monitor.metrics.decoding import Records, stage_period
 
 NONE = -1
 """What a column of whole numbers holds at a sample whose message is missing; others hold NaN."""
@@ -113,7 +113,9 @@ def table(path: str | Path, progress: Progress | None = None) -> Table:
     if not records:
         raise BagError(f"the bag '{bag.path}' holds no run: none of its topics")
     samples = _samples(records)
-    period = _period(records, run.metrics.sample_time)
+    measured = records.get('measurement')
+    stage = None if measured is None else stage_period(measured)
+    period = stage or run.metrics.sample_time
     named = {name: (unit, text) for name, unit, text in FIRST}
     found: dict[str, NDArray[Any]] = {'sample': samples, 'time': period * samples}
     rows = {key: np.searchsorted(samples, _numbers(part)) for key, part in records.items()}
@@ -175,17 +177,6 @@ def _samples(records: dict[str, Records]) -> NDArray[np.int64]:
         np.concatenate([_numbers(part) for part in records.values()])
     )
     return samples
-
-
-def _period(records: dict[str, Records], otherwise: float) -> float:
-    """Stage time from sample to sample [s]: a stamp is that of sample 0, plus so many of these."""
-    for key in ('measurement', 'plant', 'controller'):
-        part = records.get(key)
-        if part is not None and len(part) > 1:
-            numbers, when = _numbers(part), stamps(part)
-            passed = int(when[-1] - when[0]) / int(numbers[-1] - numbers[0])
-            return 1e-9 * round(passed, -1)
-    return otherwise
 
 
 def _outputs(records: dict[str, Records], radius: float) -> dict[str, NDArray[np.float64]]:

@@ -56,3 +56,15 @@ def stamps(records: Records) -> NDArray[np.int64]:
     seconds = records['seconds'].astype(np.int64)
     nanoseconds: NDArray[np.int64] = seconds * 1_000_000_000 + records['nanoseconds']
     return nanoseconds
+
+
+def stage_period(measured: Records) -> float | None:
+    """Stage time from sample to sample [s], by measurements in order; None where it is not known.
+
+    Former measurements were stamped by the wall clock.
+    """
+    if 'wall_time' not in (measured.dtype.names or ()):
+        return None
+    follows = np.diff(measured['sequence'].astype(np.int64)) == 1
+    periods = np.diff(stamps(measured))[follows]
+    return 1e-9 * round(float(np.median(periods))) if len(periods) else None

@@ -341,6 +341,7 @@ class _Timing:
     def __init__(self) -> None:
         self.histogram = np.zeros(_TICK_BINS, np.int64)
         self._longest = 0
+        self._periods: set[int] = set()  # the least and the greatest of stage time [ns]
         self._first: tuple[int, int, int] | None = None  # sequence, stamp, late samples
         self._last: tuple[int, int, int] | None = None
         self.latest: Instant | None = None
@@ -348,12 +349,16 @@ class _Timing:
 
     def add(self, rows: Records) -> None:
         """Take measured samples, at least one."""
-        sequence, stamp = rows['sequence'], rows['stamp']
-        if self._last is not None:
+        sequence, stamp, stage = rows['sequence'], rows['stamp'], rows['stage_time']
+        if self._last is not None and self.latest is not None:
             sequence = np.concatenate([[self._last[0]], sequence])
             stamp = np.concatenate([[self._last[1]], stamp])
-        ticks = np.diff(stamp)[np.diff(sequence) == 1]
+            stage = np.concatenate([[self.latest.stage], stage])
+        follows = np.diff(sequence) == 1
+        ticks, periods = np.diff(stamp)[follows], np.diff(stage)[follows]
         if len(ticks):
+            known = {*self._periods, int(periods.min()), int(periods.max())}
+            self._periods = {min(known), max(known)}
             self._longest = max(self._longest, int(ticks.max()))
             bins = np.clip(ticks // round(_TICK_RESOLUTION * 1e9), 0, _TICK_BINS - 1)
             self.histogram += np.bincount(bins, minlength=_TICK_BINS)
@@ -366,11 +371,13 @@ class _Timing:
         self.latest = Instant(ends[1][1], int(rows['stage_time'][-1]))
 
     def result(self, sample_time: float) -> dict[str, Any]:
+        """Its own ``sample_time`` is the stage's, None where that has no clock of its own [s]."""
         first = self._first or (0, 0, 0)
         last = self._last or (0, 0, 0)
         wall_time = (last[1] - first[1]) * 1e-9
         stage_time = (last[0] - first[0]) * sample_time
         return {
+            'sample_time': 1e-9 * min(self._periods) if len(self._periods) == 1 else None,
             'real_time_factor': stage_time / wall_time if wall_time > 0.0 else None,
             'tick_p50': self._quantile(0.5),
             'tick_p99': self._quantile(0.99),

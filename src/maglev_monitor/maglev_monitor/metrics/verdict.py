@@ -11,6 +11,7 @@ from maglev_monitor.metrics.readable import angle_or_length, holes, number
 from maglev_monitor.metrics.run_parameters import RunLimits, RunParameters
 
 _MISSING = 'number of missing samples'
+_NANOSECOND = 1e-9  # to which the stage rounds [s]
 
 
 def verdict(figures: Mapping[str, Any], run: RunParameters, *, complete: bool) -> dict[str, Any]:
@@ -26,7 +27,7 @@ def verdict(figures: Mapping[str, Any], run: RunParameters, *, complete: bool) -
     limits = run.limits
     reasons = [f'fault in {fault}' for fault in figures['faults']]
     reasons += [*_axis_reasons(figures, run), *_step_reasons(figures, limits)]
-    reasons += _other_reasons(figures, limits)
+    reasons += [*_sample_time_reason(figures, run), *_other_reasons(figures, limits)]
     if figures['faults'] or (complete and reasons):
         word = 'fail'
     else:
@@ -94,6 +95,16 @@ def _step_reasons(figures: Mapping[str, Any], limits: RunLimits) -> Iterator[str
                 continue
             shown = f'{number(value)} s' if value is not None else 'never reached'
             yield f'{name}: {symbol} is {shown}, allowed is {number(bound)} s'
+
+
+def _sample_time_reason(figures: Mapping[str, Any], run: RunParameters) -> Iterator[str]:
+    """Each figure in seconds is wrong where the monitor has not been told how the stage samples."""
+    stage, told = figures['timing']['sample_time'], run.metrics.sample_time
+    if stage is not None and abs(stage - told) > _NANOSECOND:
+        yield (
+            f'the stage samples every {number(1e3 * stage)} ms, but metrics.sample_time is'
+            f' {number(1e3 * told)} ms: all times here are by the latter'
+        )
 
 
 def _other_reasons(figures: Mapping[str, Any], limits: RunLimits) -> Iterator[str]:
