@@ -43,6 +43,12 @@ def mode(observer: Observer) -> int:
     return int(observer.newest(CONTROLLER_STATE).mode)
 
 
+def test_an_address_of_another_machine_is_refused(nodes: Nodes) -> None:
+    web = nodes.start('web', 'host:=192.0.2.1')  # of documents only (RFC 5737)
+    assert web.wait() == 1
+    assert "web: error: cannot serve the page at '192.0.2.1'" in web.output
+
+
 def test_the_page_shows_the_flight_and_its_buttons_act(flying: Process, watching: Observer) -> None:
     with PageClient(address(flying), origin=address(flying)) as page:
         page.wait(lambda: len(set(heights(page.messages))) > 5)

@@ -71,7 +71,11 @@ class WebNode(MaglevNode[WebNodeParameters]):
             if error.name == 'viser':
                 raise NodeError(_MISSING) from error
             raise
-        return Page(self.parameters, f'maglev stage {self.get_namespace()}'.rstrip('/ '))
+        try:
+            return Page(self.parameters, f'maglev stage {self.get_namespace()}'.rstrip('/ '))
+        except OSError as error:
+            host = self.parameters.host
+            raise NodeError(f"cannot serve the page at '{host}': {error.strerror}") from error
 
     def _update(self) -> None:
         for topic, tap in self._taps.items():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import socket
 from typing import Any
 
 import viser
@@ -33,7 +34,12 @@ class _Server(viser.ViserServer):
 
 
 def serve(host: str, port: int, title: str = '') -> Any:
-    """A server at an address and a port, or the next one that is free; 0: any."""
+    """A server at an address and a port, or the next one that is free; 0: any.
+
+    Raises OSError for an address that is none of this machine's.
+    """
+    family, *_ = socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM)[0]
+    socket.create_server((host, 0), family=family).close()  # viser would try for ever
     with contextlib.redirect_stdout(io.StringIO()):  # its banner
         server: Any = _Server(host=host, port=port, label=title, verbose=False)
     camera = server.initial_camera
