@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import time
 
+import pytest
 from graph import Process
 from ros2_command import Ros2
 
@@ -96,6 +98,23 @@ def test_echo_of_some(ros2: Ros2, small: Process) -> None:
     code, _, err = ros2('topic', 'echo', '--field', 'gaap', '/stage/measurement')
     assert code == 1
     assert err.startswith("Invalid field 'gaap': ")
+    wrong = ros2('topic', 'echo', '--filter', 'm.gaap > 0', '/stage/measurement')
+    what = "Invalid filter: 'Measurement' object has no attribute 'gaap'\n"
+    assert wrong == (1, '', what)
+
+
+@pytest.mark.parametrize(
+    'words',
+    [
+        ('topic', 'echo', '/a b', 'std_msgs/msg/String'),
+        ('topic', 'pub', '-1', '/a b', 'std_msgs/msg/String'),
+        ('service', 'call', 'a b', 'std_srvs/srv/Trigger'),
+    ],
+)
+def test_what_is_no_name_is_refused_in_a_line(ros2: Ros2, words: tuple[str, ...]) -> None:
+    code, out, err = ros2(*words)
+    assert (code, out) == (1, '')
+    assert re.fullmatch("'/?a b' is no name: topic name must not contain .*\n", err)
 
 
 def test_pub(ros2: Ros2, small: Process) -> None:
@@ -195,6 +214,8 @@ def test_dump_and_load(ros2: Ros2, small: Process, tmp_path: object) -> None:
     assert (code, out) == (0, 'Set parameter steps successful\n')
     assert err.startswith('Set parameter limits.current failed: ')
     assert ros2('param', 'dump', '/small').out == before.replace('steps: 3', 'steps: 4')
+    file.write_text('[steps, 4]')
+    assert ros2('param', 'load', '/small', str(file)) == (1, '', f"'{file}' is no parameter file\n")
     code, _, err = ros2('param', 'load', '/small', f'{file}.none')
     assert code == 1
     assert 'No such file' in err

@@ -10,8 +10,10 @@ from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import rclpy
+from rclpy.exceptions import InvalidTopicNameException
 from rclpy.signals import SignalHandlerOptions
 from rclpy.topic_or_service_is_hidden import topic_or_service_is_hidden
+from rclpy.validate_full_topic_name import validate_full_topic_name
 
 from maglev_node.dds import local_participants, only_here, prepare_middleware
 from maglev_node.polling import PollingNode
@@ -207,8 +209,17 @@ def _shown(found: list[tuple[str, list[str]]], hidden: bool) -> dict[str, list[s
 
 
 def absolute(name: str) -> str:
-    """The full name of what a command line may name without the leading slash."""
-    return name if name.startswith('/') else f'/{name}'
+    """The full name of what a command line may name without the leading slash.
+
+    Raises :class:`CommandError` for what is no name.
+    """
+    full = name if name.startswith('/') else f'/{name}'
+    try:
+        validate_full_topic_name(full)
+    except InvalidTopicNameException as error:
+        reason = str(error).splitlines()[0].partition(': ')[2]
+        raise CommandError(f"'{name}' is no name: {reason.rstrip(':')}") from error
+    return full
 
 
 def ask(own: PollingNode, kind: type, service: str, request: Any) -> Any:

@@ -139,6 +139,8 @@ def load(arguments: Any) -> None:
             )
         except (OSError, RuntimeError, yaml.YAMLError) as error:
             raise CommandError(str(error)) from error
+        except (AttributeError, TypeError) as error:  # what its reader makes of any other YAML
+            raise CommandError(f"'{arguments.parameter_file}' is no parameter file") from error
         parameters = list(given.values())
         results = _set(own, full, parameters)
     for parameter, result in zip(parameters, results, strict=True):

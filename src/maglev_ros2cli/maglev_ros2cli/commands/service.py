@@ -76,11 +76,11 @@ def call(arguments: Any) -> None:
     """Wait for a service, call it once or at a rate, and print each response."""
     if arguments.rate is not None and arguments.rate <= 0:
         raise CommandError('rate must be greater than zero')
-    kind = find_type(arguments.service_type, 'srv')
+    name, kind = absolute(arguments.service_name), find_type(arguments.service_type, 'srv')
     request = kind.Request()
     stampers = fill(request, values_of(sys.stdin.read() if arguments.stdin else arguments.values))
     with node() as own:
-        client = own.create_client(kind, arguments.service_name)
+        client = own.create_client(kind, name)
         if not wait_until(client.service_is_ready, _FIRST_LOOK):
             print('waiting for service to become available...')
             wait_until(client.service_is_ready)

@@ -126,7 +126,14 @@ def _filter(expression: str | None) -> Callable[[Any], bool]:
         code = compile(expression, 'filter', 'eval')
     except SyntaxError as error:
         raise CommandError(f'Invalid filter: {error}') from error
-    return lambda message: bool(eval(code, {}, {'m': message}))
+
+    def holds(message: Any) -> bool:
+        try:
+            return bool(eval(code, {}, {'m': message}))
+        except Exception as error:
+            raise CommandError(f'Invalid filter: {error}') from error
+
+    return holds
 
 
 def _length(text: str) -> int:
