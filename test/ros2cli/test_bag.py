@@ -162,6 +162,7 @@ def test_record_wants_topics(ros2: Ros2, tmp_path: Path) -> None:
         (['record', '--regex', '['], "'[' is no expression: unterminated character set"),
         (['play', '.', '--delay', '-1'], '-1 s, it must be at least 0 s'),
         (['play', '.', '--start-offset', 'inf'], 'inf s, it must be at least 0 s, and finite'),
+        (['play', '.', '-r', '0'], '0, it must be above 0'),
     ],
 )
 def test_what_cannot_be_meant_is_refused_in_a_line(ros2: Ros2, words: list[str], said: str) -> None:

@@ -83,11 +83,14 @@ def run(arguments: Sequence[str] | None = None) -> int:
         return _refuse(_MISSING, NO_VISER)
     page = (given.out or run_folder(given.bag)) / REPLAY
     try:
-        write_whole(page, replay(analyse(given.bag, Progress('replay', '%', lines=False))))
+        analysis = analyse(given.bag, Progress('replay', '%', lines=False))
+        write_whole(page, replay(analysis))
     except BagError as error:
         return _refuse(str(error))
     except OSError as error:
         return _refuse(f"cannot write to '{page.parent}': {error.strerror}")
+    for note in analysis.notes:
+        print(f'replay: {note}', file=sys.stderr)
     print(f'replay: {page}')
     return 0
 

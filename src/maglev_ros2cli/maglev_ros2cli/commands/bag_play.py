@@ -158,8 +158,8 @@ def _renamed(rules: list[str]) -> dict[str, str]:
 
 def _positive(text: str) -> float:
     value = float(text)
-    if not value > 0.0:
-        raise ValueError
+    if not 0.0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f'{text}, it must be above 0, and finite')
     return value
 
 
