@@ -47,7 +47,8 @@ def spectrum(analysis: Analysis) -> Chart | None:
         return None
     caption = (
         'Amplitude spectral density of the errors over the samples of the figure above: integrated '
-        "over the frequency, its square is the errors' variance."
+        'over the frequency, its square is the variance of what is faster than '
+        f'{rate / _WINDOW:.2g} Hz.'
     )
     return Chart('Spectrum of the errors', caption, drawn)
 
