@@ -8,16 +8,20 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 from made_up_run import TOPICS, open_bag, write_samples
 
 from maglev_monitor.bag.analysis import analyse
+from maglev_monitor.metrics import curves
 from maglev_monitor.metrics.curves import COLUMNS
 from maglev_monitor.metrics.run_parameters import RunParameters
 from maglev_monitor.report.error_charts import spectrum
 from maglev_monitor.report.run_charts import charts
 
 
-def test_every_step_stands_beside_its_own_figures(tmp_path: Path, run: Any, encoder: Any) -> None:
+def test_every_step_stands_beside_its_own_figures(
+    tmp_path: Path, run: Any, encoder: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Also behind one of 50 nm."""
     stepped = dataclasses.replace(run, target=run.target.copy())
     stepped.target[run.segment >= 3, 0] = 0.02 + 5e-8
@@ -31,6 +35,11 @@ def test_every_step_stands_beside_its_own_figures(tmp_path: Path, run: Any, enco
     shown = [panel.legend[0].items[0].label.value for panel in chart.panels]
     for words, step in zip(shown[1::2], analysis.result['steps'], strict=True):
         assert words.startswith(f'overshoot {step["overshoot_percent"]:.1f} %')
+    assert chart.caption.startswith('Every step of an axis')
+
+    monkeypatch.setattr(curves, '_MOST_STEPS', 1)
+    (chart,) = (chart for chart in charts(analyse(tmp_path)) if chart.title == 'Steps')
+    assert chart.caption.startswith('Each of the first 1 of 2 steps of an axis')
 
 
 def test_the_spectrum_s_integral_is_the_variance_of_what_its_caption_names() -> None:
@@ -40,8 +49,8 @@ def test_the_spectrum_s_integral_is_the_variance_of_what_its_caption_names() -> 
     error = 1e-6 * (np.sin(100.0 * np.pi * time) + 30.0 * np.sin(0.2 * np.pi * time))
     values[:, COLUMNS['true_error'].start] = error
     run, result = RunParameters(), {'error_source': 'true'}
-    curves = SimpleNamespace(tail=(np.arange(len(values)), values))
-    chart: Any = spectrum(SimpleNamespace(run=run, result=result, curves=curves))  # type: ignore[arg-type]
+    shown = SimpleNamespace(tail=(np.arange(len(values)), values))
+    chart: Any = spectrum(SimpleNamespace(run=run, result=result, curves=shown))  # type: ignore[arg-type]
     density = chart.panels[0].renderers[0].data_source.data
     total = (np.square(density['y'].astype(float)) * np.gradient(density['x'])).sum()
     fast = np.isclose(density['x'], 50.0, atol=3.0)

@@ -141,8 +141,10 @@ def _steps(analysis: Analysis) -> Chart | None:
     for axis in sorted({index for index, _, _ in stepped}):
         steps = [(step, found) for index, step, found in stepped if index == axis]
         drawn += _step_panels(analysis, axis, steps)
+    every, shown = len(analysis.result['steps']), len(stepped)
+    which = 'Every step' if every <= shown else f'Each of the first {shown} of {every} steps'
     caption = (
-        'Every step of an axis from its first sample on, and its absolute error on a logarithmic '
+        f'{which} of an axis from its first sample on, and its absolute error on a logarithmic '
         'scale (as Figs. 4 and 5 of the paper). The bands are the bounds of t_s and t_enc, the '
         'upright lines the instants at which the error has come to stay within them; in grey those '
         "of the paper's machine, where it made the same step."
