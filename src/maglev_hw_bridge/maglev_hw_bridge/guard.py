@@ -46,6 +46,7 @@ MOTORS: Final = 6
 _RESIDUAL_SAMPLES = 2
 _UNEXPLAINED_SAMPLES = 10
 _BEGUN = 2  # samples for position and rate
+_LEAPT = 2.5e-4  # more than this while the boards start is no motion of what rests [m]
 _IMPOSSIBLE = 0.01  # so far beyond its stop, tilts and all, an encoder reads no place [m]
 
 
@@ -86,13 +87,15 @@ def _unexplained(g: GuardArrays) -> int:
 
 @borrowing
 def _lose_impossible(g: GuardArrays) -> bool:
-    """Do without what reads a place where no platen can be; whether there is some."""
+    """Do without what reads a place where no platen can be, or has come; whether there is some."""
     found = False
     for i in range(6):
         axis = Y if i < 4 else i - 3
         room = max(g.lower[axis] - g.believed[i], g.believed[i] - g.upper[axis])
-        if g.trust[i] != LOST and room > _IMPOSSIBLE:
+        leapt = abs(g.believed[i] + g.offset[i] - g.expected[i]) > _LEAPT
+        if g.trust[i] != LOST and (room > _IMPOSSIBLE or leapt):
             g.trust[i], g.blamed[i], found = LOST, 1, True
+        g.expected[i] = math.nan
     return found
 
 
@@ -206,11 +209,16 @@ class Guard:
             soft_upper=fault.upper,
             max_unexplained=fault.unexplained,
             at_once=[float(board != 0) for board in parameters.encoder.board],
+            expected=(math.nan,) * 6,
         )
 
-    def forget(self) -> None:
-        """Begin anew with the next sample; what an encoder lost it has lost until :meth:`trust`."""
+    def forget(self, length: FloatArray | None = None) -> None:
+        """Begin anew with the next sample; what an encoder lost it has lost until :meth:`trust`.
+
+        One that reads ``length`` (6,) [m] right before it, by much other than in it, is lost.
+        """
         g = self.arrays
+        g.expected[:] = math.nan if length is None else length
         g.samples = g.contradictions = 0
         g.unseen[:] = g.step[:] = g.rate[:] = 0.0
         g.silent[:] = 0

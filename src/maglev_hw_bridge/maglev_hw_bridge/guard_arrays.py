@@ -37,6 +37,7 @@ class GuardArrays(ObserverArrays):
     offset: Annotated[FloatArray, 6]  # what an encoder reads too much [m]
     blamed: Annotated[NDArray[np.int8], 6]  # found wrong in this sample
     samples: int  # seen
+    expected: Annotated[FloatArray, 6]  # read right before the first; not a number: not known [m]
     contradictions: int  # samples in a row with too large a residual
     unexplained: Annotated[NDArray[np.int64], 5]  # samples in a row with too large a disturbance
     residual: float  # g1 + g3 - g2 - g4 as it is read [m]

@@ -210,7 +210,7 @@ class StageLife(abc.ABC):
             self.driver.start()
         except DriverError as error:
             raise self._lose_boards(error) from error
-        self.guard.forget()
+        self.guard.forget(self.encoders.arrays.length)
         self._active = True
         self.mode = Mode.FOLLOWING
 
@@ -309,7 +309,8 @@ class StageLife(abc.ABC):
         if remaining:
             return False, f'the cause is still there: {remaining}'
         cleared, self.fault = self.fault, None
-        self.guard.forget()
+        samples = self.mode is Mode.DISABLED  # all the time
+        self.guard.forget(self.encoders.arrays.length if samples else None)
         self.resume()
         if self.mode is Mode.LOST:
             return False, str(self.fault)
