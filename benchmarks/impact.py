@@ -40,7 +40,7 @@ def airborne(motion: References) -> tuple[BridgeStage, EmulatedDriver]:
     driver = stage.driver
     assert isinstance(driver, EmulatedDriver)
     stage.deactivate()
-    driver.boards.rig.place(position, velocity)
+    driver.boards.place(position, velocity)
     stage.activate()
     machine = machine_constants(stage.parameters.machine)
     for _ in range(8):

@@ -71,7 +71,7 @@ class Loop:
     def __init__(self, target: Target = ellipse, samples: int = 200) -> None:
         self.flight = Flight(target, dict(SWIFT_LANDING))
         self.stage, self.rig = self.flight.stage, self.flight.rig
-        self.rig.place(np.array([LOWER_STOP, 0.0, 0.0, 0.0, 0.0]))
+        self.flight.boards.place(np.array([LOWER_STOP, 0.0, 0.0, 0.0, 0.0]))
         self.stage.deactivate()
         self.node: Any = MadeUpNode(mode='realtime')
         self.sampling: Any = Sampling(self.node, self.stage)

@@ -175,7 +175,7 @@ def test_what_was_moved_while_nobody_looked_has_not_left_its_stop() -> None:
     flight = Flight(hover(LOWER_STOP))
     lift(flight, 1e-4, 2e-3)
     flight.stage.deactivate()
-    flight.rig.place(np.array([UPPER_STOP, 0.0, 0.0, 0.0, 0.0]))
+    flight.boards.place(np.array([UPPER_STOP, 0.0, 0.0, 0.0, 0.0]))
     flight.stage.activate()
     for _ in range(5):
         flight.stage.read()

@@ -56,7 +56,7 @@ class Flight:
         self.target = target
         self.stage.configure()
         position, velocity, _ = target(0.0)
-        self.rig.place(position, velocity)
+        self.boards.place(position, velocity)
         self.stage.activate()
         self.samples = 0
         self.detected: int | None = None  # samples from the start to the latched fault

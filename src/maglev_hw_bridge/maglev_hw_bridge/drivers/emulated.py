@@ -19,6 +19,7 @@ from maglev_hw_bridge.emulated_lines import Lines
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.rig import Rig
 from maglev_hw_bridge.signal_parameters import CHANNELS
+from maglev_model.axes import FloatArray
 
 _STANDSTILL = 0.25
 """Share of the patience after which the boards stand still with a bridge that is stopped."""
@@ -136,6 +137,11 @@ class EmulatedBoards:
         self.rig.tell(self.past[self.ticks % len(self.past)])
         for card in list(self.cards.values()):
             card.on_tick()
+
+    def place(self, position: FloatArray, velocity: FloatArray | None = None) -> None:
+        """Have the platen there (5,) [m, rad], by default at rest; the counters tell it."""
+        self.rig.place(position, velocity)
+        self._count()
 
     def outputs(self) -> NDArray[np.float64]:
         """What the amplifiers of the phases are asked for, shape (12,) [V]."""
