@@ -29,8 +29,8 @@ class Recorder:
     def rest(self) -> None:
         self.told.append('rest')
 
-    def look_ahead(self, arrays: Any, repeats: bool) -> None:
-        self.told.append(('look', arrays, repeats))
+    def look_ahead(self, arrays: Any, measured: bool, position: Any, velocity: Any) -> None:
+        self.told.append(('look', arrays, measured, [*position], [*velocity]))
 
     def learn(self, arrays: Any) -> None:
         self.told.append(('learn', arrays))
@@ -159,11 +159,12 @@ def test_learning_looks_ahead_and_learns_in_each_sample_where_it_repeats(phase: 
     supervisor.learning = learning  # type: ignore[assignment]
     lead(supervisor, 2, phase, HOVER, 0.025)
     arrays = supervisor.regulator.arrays
-    assert learning.told == [('look', arrays, phase == Phase.TRACK), ('learn', arrays)]
+    wanted = ([*HOVER], [0.0] * 5)
+    assert learning.told == [('look', arrays, phase == Phase.TRACK, *wanted), ('learn', arrays)]
     learning.told.clear()
     supervisor.disable()
     lead(supervisor, 3, phase, HOVER, 0.025)
-    assert learning.told == [('look', arrays, False), ('learn', arrays)]
+    assert [each[:3] for each in learning.told] == [('look', arrays, False), ('learn', arrays)]
 
 
 def test_only_a_new_step_begins_the_models_anew() -> None:
