@@ -2,6 +2,7 @@
 # The steps of the set-up, each quiet on success and explained in one line on failure.
 
 declare -A titles=() begun=() # of the steps at work, by the process that does them
+beginning=''                  # title of the one that is begun, and not among them yet
 
 # Show a step and its seconds while COMMAND works; its output goes to the log.
 step() { # TITLE COMMAND...
@@ -14,6 +15,7 @@ begin() { # TITLE COMMAND...
   local title=$1
   shift
   [[ -t 2 ]] || say "$title"
+  beginning=$title
   set -m # a process group of its own, for stop_steps
   (
     set +m
@@ -23,6 +25,7 @@ begin() { # TITLE COMMAND...
   set +m
   titles[$!]=$title
   begun[$!]=$SECONDS
+  beginning=''
 }
 
 # Wait for JOB, or else for all that were begun. The first that fails ends the others and the set-up.
@@ -53,7 +56,7 @@ ended() { # JOB CODE
 }
 
 forget() { # JOB
-  { printf '\n== %s\n' "${titles[$1]}" && cat -- "$log.$1" || true; } >>"$log"
+  { printf '\n== %s\n' "${titles[$1]}" && cat -- "$log.$1" 2>/dev/null || true; } >>"$log"
   unset "titles[$1]" "begun[$1]"
   rm -f -- "$log.$1"
 }
@@ -72,6 +75,9 @@ show_steps() {
 
 stop_steps() {
   local job
+  [[ -z $beginning ]] || for job in $(jobs -p); do
+    titles[$job]=${titles[$job]:-$beginning}
+  done
   for job in "${!titles[@]}"; do
     kill -- "-$job" 2>/dev/null || true
   done

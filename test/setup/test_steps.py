@@ -97,3 +97,13 @@ def test_interrupted_no_step_goes_on(tmp_path: Path, signal_: signal.Signals, co
         code,
         ['setup: long', 'setup: interrupted: the next run completes it'],
     )
+
+
+def test_interrupted_before_it_is_noted_a_step_ends_all_the_same(tmp_path: Path) -> None:
+    signalled = (
+        '[[ $BASH_COMMAND != titles* ]] || { trap - DEBUG;'
+        ' until [[ -s $root/pid ]]; do sleep 0.02; done; kill -INT $$; }'
+    )
+    steps = Steps(tmp_path, f"set -T; trap '{signalled}' DEBUG; begin long endless; finish")
+    said = ['setup: long', 'setup: interrupted: the next run completes it']
+    assert steps.end(tmp_path) == (130, said)
