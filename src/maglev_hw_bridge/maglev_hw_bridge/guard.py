@@ -87,7 +87,7 @@ def _unexplained(g: GuardArrays) -> int:
 
 @borrowing
 def _lose_impossible(g: GuardArrays) -> bool:
-    """Do without what reads a place where no platen can be, or has come; whether there is some."""
+    """Do without what reads where no platen can be, or can have come to; whether there is some."""
     found = False
     for i in range(6):
         axis = Y if i < 4 else i - 3

@@ -309,8 +309,8 @@ class StageLife(abc.ABC):
         if remaining:
             return False, f'the cause is still there: {remaining}'
         cleared, self.fault = self.fault, None
-        samples = self.mode is Mode.DISABLED  # all the time
-        self.guard.forget(self.encoders.arrays.length if samples else None)
+        read_until_now = self.mode is Mode.DISABLED
+        self.guard.forget(self.encoders.arrays.length if read_until_now else None)
         self.resume()
         if self.mode is Mode.LOST:
             return False, str(self.fault)
