@@ -160,9 +160,9 @@ def test_record_wants_topics(ros2: Ros2, tmp_path: Path) -> None:
     ('words', 'said'),
     [
         (['record', '--regex', '['], "'[' is no expression: unterminated character set"),
-        (['play', '.', '--delay', '-1'], '-1 s, it must be at least 0 s'),
-        (['play', '.', '--start-offset', 'inf'], 'inf s, it must be at least 0 s, and finite'),
-        (['play', '.', '-r', '0'], '0, it must be above 0'),
+        (['play', '.', '--delay', '-1'], "'-1' is no finite number of at least 0"),
+        (['play', '.', '--start-offset', 'inf'], "'inf' is no finite number of at least 0"),
+        (['play', '.', '-r', '0'], "'0' is no finite number above 0"),
     ],
 )
 def test_what_cannot_be_meant_is_refused_in_a_line(ros2: Ros2, words: list[str], said: str) -> None:

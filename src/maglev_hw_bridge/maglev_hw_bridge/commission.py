@@ -33,6 +33,7 @@ from maglev_hw_bridge.proof import Proof, WrongError
 from maglev_hw_bridge.response import Pulses, Twins
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES, PHASE_NAMES, PHASES
 from maglev_hw_bridge.stage import BridgeStage
+from maglev_model.arguments import number
 from maglev_model.axes import FloatArray
 from maglev_model.command import leave_with
 from maglev_model.parameters import ParameterError, from_yaml
@@ -311,7 +312,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument(
         '--current',
-        type=float,
+        type=number(0.2, 3.0),
         default=1.5,
         metavar='A',
         help='largest current of a phase alone, 0.2 to 3 A (default 1.5)',
@@ -319,8 +320,6 @@ def run(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument('--yes', action='store_true', help='do not ask before each step')
     add_output_options(parser)
     options = parser.parse_args(arguments)
-    if not 0.2 <= options.current <= 3.0:
-        parser.error(f'--current is {options.current:g} A, it must lie in [0.2, 3]')
     if options.quiet and not options.yes:
         parser.error('--quiet needs --yes: it asks nothing')
     said: list[str] = []

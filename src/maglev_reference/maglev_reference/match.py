@@ -19,6 +19,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from maglev_model.arguments import positive, whole_number
 from maglev_model.axes import AXES
 from maglev_model.command import leave_with
 from maglev_model.parameters import ParameterError, from_yaml, replace
@@ -91,13 +92,13 @@ def run(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument(
         '--count',
-        type=int,
+        type=whole_number(1),
         default=_COUNT,
         help='oscillators of each output, at most (%(default)s)',
     )
     parser.add_argument(
         '--total',
-        type=float,
+        type=positive,
         default=_TOTAL,
         help='sum of their frequencies at most [rad/s] (%(default)s)',
     )

@@ -16,6 +16,7 @@ from rclpy.qos import (
     ReliabilityPolicy,
 )
 
+from maglev_model.arguments import count, not_negative
 from maglev_ros2cli.parser import Parser
 
 _POLICIES: dict[str, Any] = {
@@ -33,7 +34,7 @@ def add_arguments(parser: Parser, default: str) -> None:
         choices=[key for key in QoSPresetProfiles.short_keys() if key != 'unknown'],
         help=f'Quality of service preset profile (default: {default})',
     )
-    parser.add_argument('--qos-depth', metavar='N', type=int, help='Queue size setting')
+    parser.add_argument('--qos-depth', metavar='N', type=count, help='Queue size setting')
     for name, policy in _POLICIES.items():
         keys = [key for key in policy.short_keys() if key != 'unknown']
         parser.add_argument(
@@ -42,7 +43,7 @@ def add_arguments(parser: Parser, default: str) -> None:
     parser.add_argument(
         '--qos-liveliness-lease-duration-seconds',
         metavar='SECONDS',
-        type=float,
+        type=not_negative,
         help='Quality of service liveliness lease duration setting',
     )
     parser.set_defaults(qos_default=default)

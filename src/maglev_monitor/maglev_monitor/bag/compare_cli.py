@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NoReturn
 
+from maglev_model.arguments import not_negative
 from maglev_model.command import leave_with
 from maglev_model.progress import Progress
 from maglev_model.wire import TOPIC_TYPES
@@ -75,7 +75,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         '--tolerance',
-        type=_tolerance,
+        type=not_negative,
         default=0.0,
         metavar='X',
         help='differences up to this are none, in SI units (default: 0, bit by bit)',
@@ -84,13 +84,6 @@ def _parser() -> argparse.ArgumentParser:
         '--wall-clock', action='store_true', help='compare stamps and late samples too'
     )
     return parser
-
-
-def _tolerance(text: str) -> float:
-    value = float(text)
-    if not 0.0 <= value < math.inf:
-        raise argparse.ArgumentTypeError(f'it is {text}, it must be finite and not below 0')
-    return value
 
 
 def _lines(key: str, topic: TopicComparison, tolerance: float) -> Iterator[str]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
-import math
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -13,6 +11,7 @@ from rosbags.interfaces import Connection, ConnectionExtRosbag2
 from rosbags.rosbag2 import Reader
 from rosgraph_msgs.msg import Clock
 
+from maglev_model.arguments import not_negative, positive
 from maglev_node.polling import PollingNode
 from maglev_node.stamp import set_stamp
 from maglev_ros2cli.bags import add_bag_path, add_overrides, opened, overrides, profile
@@ -30,22 +29,22 @@ def add(verbs: Verbs) -> None:
     """Give the verb to its command."""
     verb = verbs.add('play', play, 'Play back ROS data from a bag')
     add_bag_path(verb)
-    verb.add_argument('-r', '--rate', type=_positive, default=1.0, help='Rate at which to play')
+    verb.add_argument('-r', '--rate', type=positive, default=1.0, help='Rate at which to play')
     verb.add_argument('-l', '--loop', action='store_true', help='Play again when it has ended')
     verb.add_argument('--topics', nargs='+', metavar='TOPIC', help='To replay (default: all)')
     verb.add_argument('-m', '--remap', nargs='+', default=[], metavar='OLD:=NEW', help='New names')
     verb.add_argument(
         '--clock',
-        type=_positive,
+        type=positive,
         nargs='?',
         const=_CLOCK_RATE,
         metavar='HZ',
         help=f'Publish to /clock at a rate, by default {_CLOCK_RATE:g} Hz',
     )
-    verb.add_argument('-d', '--delay', type=_seconds, default=0.0, help='Sleep SEC before play')
+    verb.add_argument('-d', '--delay', type=not_negative, default=0.0, help='Sleep SEC before play')
     verb.add_argument(
         '--start-offset',
-        type=_seconds,
+        type=not_negative,
         default=0.0,
         help='Start from this many seconds into the bag',
     )
@@ -154,17 +153,3 @@ def _renamed(rules: list[str]) -> dict[str, str]:
             raise CommandError(f"[ERROR] [ros2bag]: '{rule}' is no rule OLD:=NEW")
         names[old] = new
     return names
-
-
-def _positive(text: str) -> float:
-    value = float(text)
-    if not 0.0 < value < math.inf:
-        raise argparse.ArgumentTypeError(f'{text}, it must be above 0, and finite')
-    return value
-
-
-def _seconds(text: str) -> float:
-    value = float(text)
-    if not 0.0 <= value < math.inf:
-        raise argparse.ArgumentTypeError(f'{text} s, it must be at least 0 s, and finite')
-    return value

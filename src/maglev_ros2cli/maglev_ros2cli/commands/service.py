@@ -6,7 +6,7 @@ import sys
 import time
 from typing import Any
 
-from maglev_ros2cli.errors import CommandError
+from maglev_model.arguments import positive
 from maglev_ros2cli.graph import (
     absolute,
     add_arguments,
@@ -36,7 +36,7 @@ def add(parser: Parser) -> None:
         'values', nargs='?', default='{}', help="The request's values in YAML: '{a: 1, b: 2}'"
     )
     verb.add_argument('--stdin', action='store_true', help='Read values from standard input')
-    verb.add_argument('-r', '--rate', type=float, metavar='N', help='Repeat the call at N Hz')
+    verb.add_argument('-r', '--rate', type=positive, metavar='N', help='Repeat the call at N Hz')
     verb = verbs.add('list', list_, 'Output a list of available services')
     add_arguments(verb)
     verb.add_argument('-t', '--show-types', action='store_true', help='Also show the types')
@@ -74,8 +74,6 @@ def type_(arguments: Any) -> int:
 
 def call(arguments: Any) -> None:
     """Wait for a service, call it once or at a rate, and print each response."""
-    if arguments.rate is not None and arguments.rate <= 0:
-        raise CommandError('rate must be greater than zero')
     name, kind = absolute(arguments.service_name), find_type(arguments.service_type, 'srv')
     request = kind.Request()
     stampers = fill(request, values_of(sys.stdin.read() if arguments.stdin else arguments.values))

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import argparse
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
+from maglev_model.arguments import count, not_negative
 from maglev_node.polling import PollingNode
 from maglev_ros2cli import qos
 from maglev_ros2cli.errors import CommandError
@@ -35,7 +35,7 @@ def add(verbs: Verbs) -> None:
     verb.add_argument(
         '-l',
         '--truncate-length',
-        type=_length,
+        type=count,
         default=_TRUNCATE,
         help=f'Length to truncate arrays, bytes and strings to (default: {_TRUNCATE})',
     )
@@ -46,7 +46,7 @@ def add(verbs: Verbs) -> None:
     verb.add_argument('--raw', action='store_true', help='Echo the raw binary representation')
     verb.add_argument('--filter', metavar='EXPR', help="Only messages for which EXPR of 'm' holds")
     verb.add_argument('--once', action='store_true', help='Print the first message, then exit')
-    verb.add_argument('--timeout', metavar='N', type=float, help='Exit after N seconds')
+    verb.add_argument('--timeout', metavar='N', type=not_negative, help='Exit after N seconds')
 
 
 def echo(arguments: Any) -> None:
@@ -134,9 +134,3 @@ def _filter(expression: str | None) -> Callable[[Any], bool]:
             raise CommandError(f'Invalid filter: {error}') from error
 
     return holds
-
-
-def _length(text: str) -> int:
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError('value must be non-negative integer')
-    return int(text)

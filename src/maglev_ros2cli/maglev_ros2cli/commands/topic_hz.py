@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import argparse
 import collections
 import statistics
 import time
 from typing import Any
 
+from maglev_model.arguments import whole_number
 from maglev_ros2cli import qos
 from maglev_ros2cli.commands.topic_echo import the_type
 from maglev_ros2cli.graph import absolute, add_arguments, add_topic_name, graph, topics, wait_until
@@ -28,7 +28,7 @@ def add(verbs: Verbs) -> None:
     verb.add_argument(
         '-w',
         '--window',
-        type=_positive,
+        type=whole_number(1),
         default=_WINDOW,
         help=f'window size, in # of messages, for calculating rate (default: {_WINDOW})',
     )
@@ -70,9 +70,3 @@ def summary(intervals: collections.abc.Sequence[float]) -> str:
         f'average rate: {rate:.3f}\n\tmin: {min(intervals):.3f}s max: {max(intervals):.3f}s'
         f' std dev: {statistics.pstdev(intervals):.5f}s window: {len(intervals)}'
     )
-
-
-def _positive(text: str) -> int:
-    if not text.isdecimal() or int(text) == 0:
-        raise argparse.ArgumentTypeError('value must be a positive integer')
-    return int(text)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import argparse
 import time
 from typing import Any
 
+from maglev_model.arguments import count, not_negative, positive
 from maglev_ros2cli import qos
 from maglev_ros2cli.errors import CommandError
 from maglev_ros2cli.graph import absolute, add_arguments, add_topic_name, node
@@ -26,27 +26,34 @@ def add(verbs: Verbs) -> None:
     verb.add_argument(
         'values', nargs='?', default='{}', help="Values in YAML ('data: Hello World')"
     )
-    verb.add_argument('-r', '--rate', metavar='N', type=_rate, default=1.0, help='Rate in Hz')
+    verb.add_argument('-r', '--rate', metavar='N', type=positive, default=1.0, help='Rate in Hz')
     verb.add_argument(
-        '-p', '--print', metavar='N', type=int, default=1, help='Only print every N-th message'
+        '-p', '--print', metavar='N', type=count, default=1, help='Only print every N-th message'
     )
     times = verb.add_mutually_exclusive_group()
     times.add_argument('-1', '--once', action='store_true', help='Publish one message and exit')
     times.add_argument(
-        '-t', '--times', metavar='N', type=_count, default=0, help='Publish N times and then exit'
+        '-t', '--times', metavar='N', type=count, default=0, help='Publish N times and then exit'
     )
     verb.add_argument(
         '-w',
         '--wait-matching-subscriptions',
         metavar='N',
-        type=_count,
+        type=count,
         help='Wait for N subscriptions first (default: 1 with --once or --times, otherwise 0)',
     )
     verb.add_argument(
-        '--max-wait-time-secs', metavar='S', type=float, help='Wait for them at most S seconds'
+        '--max-wait-time-secs',
+        metavar='S',
+        type=not_negative,
+        help='Wait for them at most S seconds',
     )
     verb.add_argument(
-        '--keep-alive', metavar='S', type=float, default=0.1, help='Stay for S seconds at the end'
+        '--keep-alive',
+        metavar='S',
+        type=not_negative,
+        default=0.1,
+        help='Stay for S seconds at the end',
     )
     verb.add_argument('-n', '--node-name', help='Name of the created publishing node')
     qos.add_arguments(verb, 'default')
@@ -86,17 +93,3 @@ def _wait(publisher: Any, wanted: int, timeout: float | None) -> None:
             said = now
             print(f'Waiting for at least {wanted} matching subscription(s)...')
         time.sleep(0.01)
-
-
-def _rate(text: str) -> float:
-    value = float(text)
-    if not value > 0.0:
-        raise argparse.ArgumentTypeError('value must be positive')
-    return value
-
-
-def _count(text: str) -> int:
-    value = int(text)
-    if value < 0:
-        raise argparse.ArgumentTypeError('value must not be negative')
-    return value

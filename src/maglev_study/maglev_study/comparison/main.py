@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
 from maglev_controller.laws import control_law, find_law
+from maglev_model.arguments import positive
 from maglev_model.axes import THETA, X, Y
 from maglev_model.command import leave_with
 from maglev_model.parameters import ParameterError, replace
@@ -102,7 +103,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         '--bandwidth',
-        type=float,
+        type=positive,
         metavar='RAD_S',
         help='crossover of the laws with compensators on all axes (default: as in their files)',
     )

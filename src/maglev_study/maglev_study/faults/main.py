@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from maglev_model.arguments import whole_number
 from maglev_model.progress import Progress, add_output_options, talking
 from maglev_study.faults.campaign import Campaign, Outcome
 from maglev_study.faults.draw import cells, from_json, scenario
@@ -161,24 +162,19 @@ def _folder(path: Path) -> Path:
     return path.resolve()
 
 
-def _number(low: int, high: int) -> type[int]:
-    def check(text: str) -> int:
-        if not text.isdecimal() or not low <= int(text) <= high:
-            raise argparse.ArgumentTypeError(f"'{text}' is no whole number from {low} to {high}")
-        return int(text)
-
-    return check  # type: ignore[return-value]
-
-
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog='faults', description=__doc__)
     cores = os.cpu_count() or 1
     add = parser.add_argument
-    add('--runs', type=_number(1, _MOST_RUNS), default=_RUNS, metavar='N', help='how many')
+    add('--runs', type=whole_number(1, _MOST_RUNS), default=_RUNS, metavar='N', help='how many')
     add(
-        '--seed', type=_number(0, 2**53), default=0, metavar='S', help='of the first; they count up'
+        '--seed',
+        type=whole_number(0, 2**53),
+        default=0,
+        metavar='S',
+        help='of the first; they count up',
     )
-    add('--jobs', type=_number(1, 512), default=cores, metavar='J', help='processes')
+    add('--jobs', type=whole_number(1, 512), default=cores, metavar='J', help='processes')
     add('--double', action='store_true', help='a second fault up to 0.5 s after the first')
     add('--short', action='store_true', help='one run of each cell of fault and phase')
     add('--replay', metavar='SEED|FILE', help='fly one run alone, and draw it')

@@ -16,6 +16,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from maglev_model.arguments import whole_number
 from maglev_model.optional import MissingLibraryError
 from maglev_model.parameters import ParameterError
 from maglev_model.progress import Progress, add_output_options, talking
@@ -187,17 +188,6 @@ def _write_machine(plan: Plan, number: int, out: Path) -> tuple[int, dict[str, A
     return DONE, {'machine': number, 'files': [str(path)]}
 
 
-def number(low: int, high: int) -> type[int]:
-    """What argparse makes a whole number within bounds by."""
-
-    def check(text: str) -> int:
-        if not text.isdecimal() or not low <= int(text) <= high:
-            raise argparse.ArgumentTypeError(f"'{text}' is no whole number from {low} to {high}")
-        return int(text)
-
-    return check  # type: ignore[return-value]
-
-
 def command_parser(name: str, about: str | None, machines: int) -> argparse.ArgumentParser:
     """Options of a command that flies machines, ``machines`` of them unless told otherwise."""
     parser = argparse.ArgumentParser(prog=name, description=about)
@@ -211,10 +201,16 @@ def command_parser(name: str, about: str | None, machines: int) -> argparse.Argu
         metavar='FILE',
         help="parameters of plant, controller and distributions over every law's own; repeatable",
     )
-    add('--machines', type=number(1, 10**6), default=machines, metavar='N', help='how many')
+    add('--machines', type=whole_number(1, 10**6), default=machines, metavar='N', help='how many')
     add('--experiment', nargs='+', default=[], metavar='NAME', help='what is flown (default: all)')
-    add('--seed', type=number(0, 2**53), default=0, metavar='S', help='of all that is drawn')
-    add('--jobs', type=number(1, 512), default=os.cpu_count() or 1, metavar='J', help='processes')
+    add('--seed', type=whole_number(0, 2**53), default=0, metavar='S', help='of all that is drawn')
+    add(
+        '--jobs',
+        type=whole_number(1, 512),
+        default=os.cpu_count() or 1,
+        metavar='J',
+        help='processes',
+    )
     add('--scheduler', default='', metavar='ADDRESS', help='a Dask cluster, tcp://host:8786')
     add('--out', type=Path, default=Path(name), metavar='DIR', help='where results are left')
     add_output_options(parser)
@@ -241,7 +237,9 @@ def _parser() -> argparse.ArgumentParser:
     parser = command_parser('robustness', __doc__, machines=200)
     add = parser.add_argument
     add('--law', nargs='+', default=['default'], metavar='NAME', help='the laws (default: default)')
-    add('--replay', type=number(0, 10**6), metavar='N', help='write one machine for the graph')
+    add(
+        '--replay', type=whole_number(0, 10**6), metavar='N', help='write one machine for the graph'
+    )
     return parser
 
 

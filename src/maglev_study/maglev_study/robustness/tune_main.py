@@ -11,8 +11,9 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from maglev_model.arguments import not_negative, whole_number
 from maglev_model.progress import Progress
-from maglev_study.robustness.main import DONE, INTERRUPTED, command, command_parser, number, plan_of
+from maglev_study.robustness.main import DONE, INTERRUPTED, command, command_parser, plan_of
 
 if TYPE_CHECKING:
     from maglev_study.robustness.tune import Trial, Tuned
@@ -89,8 +90,8 @@ def render(found: Tuned, machines: int, seed: int) -> str:
 def _parser() -> argparse.ArgumentParser:
     parser = command_parser('tune', __doc__, machines=40)
     add = parser.add_argument
-    add('--trials', type=number(1, 10**5), default=60, metavar='N', help='how many')
-    add('--margin', type=float, default=6.0, metavar='DB', help='guaranteed in all currents')
+    add('--trials', type=whole_number(1, 10**5), default=60, metavar='N', help='how many')
+    add('--margin', type=not_negative, default=6.0, metavar='DB', help='guaranteed in all currents')
     add('--law', default='default', metavar='NAME', help='the law that is tuned')
     return parser
 
