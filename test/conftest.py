@@ -11,7 +11,7 @@ from _pytest.runner import runtestprotocol
 from hypothesis import HealthCheck, settings
 from witness import SHORT, Witness
 
-settings.register_profile('loaded', suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile('loaded', deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile('loaded')
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as a script's background jobs have it

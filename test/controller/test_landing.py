@@ -26,7 +26,7 @@ def way(position: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) ->
     return np.array(rows)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     share=st.lists(st.floats(0.1, 0.9), min_size=5, max_size=5),
     speed=st.lists(st.floats(-1.0, 1.0), min_size=5, max_size=5),
@@ -60,7 +60,7 @@ def test_durations_are_the_parameters() -> None:
     assert np.abs(rows[:, 1, 0]).max() == pytest.approx(1.875 * 0.006 / 1.5, rel=1e-3)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     start=st.tuples(st.floats(-0.05, 0.05), st.floats(-0.2, 0.2), st.floats(-2, 2)),
     duration=st.floats(0.05, 3.0),

@@ -42,7 +42,7 @@ def amplifiers(**overrides: object) -> Amplifiers:
     return Amplifiers(build(BridgeParameters, names))
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(i_d=FOUR, i_q=FOUR, x=PLACE, z=PLACE, scaling=st.sampled_from(['amplitude', 'rms']))
 def test_volts_to_currents_to_dq_and_back(
     i_d: np.ndarray, i_q: np.ndarray, x: float, z: float, scaling: str
@@ -68,7 +68,7 @@ def test_volts_to_currents_to_dq_and_back(
         assert (back.real, back.imag) == pytest.approx((i_d[motor], i_q[motor]), abs=1e-12)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(commands=st.lists(st.tuples(FOUR, FOUR), min_size=1, max_size=6), x=PLACE, z=PLACE)
 def test_nothing_leaves_its_limits(commands: list, x: float, z: float) -> None:
     slew = 2000.0

@@ -26,7 +26,7 @@ def as_counts(total: list[int]) -> np.ndarray:
     return np.array([(value + 2**31) % 2**32 - 2**31 for value in total], dtype=np.int32)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     start=st.lists(st.integers(-(2**31), 2**31 - 1), min_size=6, max_size=6),
     steps=st.lists(
@@ -46,7 +46,7 @@ def test_lengths_follow_any_motion_through_roll_over(
         assert length == pytest.approx(expected, rel=1e-14, abs=1e-15)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.lists(st.integers(-(2**31), 2**31 - 1), min_size=6, max_size=6))
 def test_homing_puts_the_platen_home(counts: list[int]) -> None:
     parameters = build(

@@ -45,7 +45,7 @@ def lengths(position: np.ndarray) -> np.ndarray:
     return np.array([*gap, position[X], position[Z]])
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(share=five, rate=five, pushed=five, i_d=four, i_q=four)
 def test_it_foretells_what_the_plant_does(
     share: np.ndarray, rate: np.ndarray, pushed: np.ndarray, i_d: np.ndarray, i_q: np.ndarray
@@ -70,7 +70,7 @@ def test_it_foretells_what_the_plant_does(
     np.testing.assert_allclose(watched.step, change, atol=1e-15)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(
     share=five,
     seated=st.booleans(),
@@ -165,7 +165,7 @@ def told(innovation: np.ndarray, used: Flags) -> np.ndarray:
     return answer
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(off=st.tuples(*[st.floats(-1e-4, 1e-4)] * 6).map(np.array), used=flags, counted=flags)
 def test_what_the_encoders_tell_corrects_by_the_observers_gains(
     off: np.ndarray, used: np.ndarray, counted: np.ndarray

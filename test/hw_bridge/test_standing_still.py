@@ -37,7 +37,7 @@ def looked(watched: GuardArrays, *, flying: bool = True) -> np.ndarray:
 # -- how far they should have moved ----------------------------------------------------------------
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(rate=five, before=st.tuples(*[st.floats(-1e-5, 1e-5)] * 6).map(np.array))
 def test_what_stands_still_should_have_moved_as_the_geometry_has_it(
     rate: np.ndarray, before: np.ndarray
@@ -338,7 +338,7 @@ def test_what_was_lost_otherwise_stays_lost(encoder: int) -> None:
 # -- what nobody shows -----------------------------------------------------------------------------
 
 
-@settings(max_examples=64, deadline=None)
+@settings(max_examples=64)
 @given(
     doubted=st.tuples(*[st.booleans()] * 6).map(np.array),
     used=st.tuples(*[st.booleans()] * 6).map(np.array),

@@ -41,7 +41,7 @@ def times(blind: np.ndarray) -> tuple[float, float]:
     return LAW.braking_time, LAW.descent_time
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     off=five,
     rate=five,
@@ -162,7 +162,7 @@ def test_what_is_at_a_stop_or_beyond_strikes_it_as_it_moves(y: float, stop: str)
     assert impact_of_cut(PARAMETERS, y, 0.2) == (0.2, stop)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(y=st.floats(0.0185, 0.0308), speed=st.floats(-0.69, 0.69))
 def test_what_a_cut_may_do_is_told_of_each_stop_the_harder_first(y: float, speed: float) -> None:
     """As it is believed; and with the place, the speed and the magnets off by what they may be."""

@@ -22,7 +22,7 @@ def attractions(answer: Answered, output: np.ndarray) -> np.ndarray:
     return pulls
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     output=outputs,
     lift=st.floats(-8.0, 60.0),
@@ -68,7 +68,7 @@ def test_where_levitation_needs_all_the_current_none_is_left_for_a_push() -> Non
     assert answer.limited_by == LEVITATION | CURRENT
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(
     output=outputs,
     lift=st.floats(-8.7, 20.0),

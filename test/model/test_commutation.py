@@ -20,7 +20,7 @@ CURRENT = st.floats(-10.0, 10.0)
 ANGLE = st.floats(-20.0, 20.0)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(i_d=CURRENT, i_q=CURRENT, angle=ANGLE, scale=st.sampled_from(sorted(SCALES.values())))
 def test_there_and_back(i_d: float, i_q: float, angle: float, scale: float) -> None:
     phases = phase_currents(i_d, i_q, angle, scale)
@@ -29,7 +29,7 @@ def test_there_and_back(i_d: float, i_q: float, angle: float, scale: float) -> N
     assert back == pytest.approx((i_d, i_q), abs=1e-12)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(i_d=CURRENT, i_q=CURRENT, angle=ANGLE)
 def test_phases_are_the_projections_on_three_windings(i_d: float, i_q: float, angle: float) -> None:
     for phase, current in enumerate(phase_currents(i_d, i_q, angle, 1.0)):

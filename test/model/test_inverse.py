@@ -24,7 +24,7 @@ from maglev_model.motor import attraction_coefficients
 from maglev_model.platen import accelerations, affine_terms
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(output=outputs, wanted=gentle)
 def test_exact_inverse_inverts_the_full_plant(output: np.ndarray, wanted: np.ndarray) -> None:
     """(6), (7) with the currents of the exact inverse give the wanted accelerations."""
@@ -35,7 +35,7 @@ def test_exact_inverse_inverts_the_full_plant(output: np.ndarray, wanted: np.nda
     np.testing.assert_allclose(answer.quadrature[[0, 1]], answer.quadrature[[2, 3]])
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(output=outputs, wanted=gentle)
 def test_simplified_inverse_solves_equation_11(output: np.ndarray, wanted: np.ndarray) -> None:
     """The paper's nominal model, from its a_i, b_j, c_k, gives the wanted accelerations."""
@@ -65,7 +65,7 @@ def test_the_paper_leaves_a_fifth_of_the_vertical_force_out_at_20_mm() -> None:
     assert 0.15 < -a[5] * v_y**2 / (a[2] * v_y) < 0.25
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(
     output=outputs,
     wanted=rough,
@@ -89,7 +89,7 @@ def test_limits_hold_whatever_is_wanted(
     assert bool(answer.limited_by & CURRENT) == (at_limit and answer.limited_by != 0)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(output=outputs, horizontal=st.tuples(st.floats(-300, 300), st.floats(-300, 300)))
 def test_levitation_comes_first(output: np.ndarray, horizontal: tuple[float, float]) -> None:
     """However much u_x and u_z are asked for, y and the tilts get what they want."""
@@ -102,7 +102,7 @@ def test_levitation_comes_first(output: np.ndarray, horizontal: tuple[float, flo
         assert abs(answer.plant[axis]) <= abs(wanted[axis]) * (1.0 + 1e-9)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     output=outputs,
     wanted=rough,
@@ -314,7 +314,7 @@ def test_an_inverse_writes_its_answer_and_nothing_beside_it(
         assert np.isfinite(part[1:-1]).all()
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(output=outputs, wanted=gentle, scale=st.floats(1.0, 200.0))
 def test_without_limits_all_is_reached_that_attraction_can_give(
     output: np.ndarray, wanted: np.ndarray, scale: float
@@ -330,7 +330,7 @@ def test_without_limits_all_is_reached_that_attraction_can_give(
     ] == pytest.approx(falling[0], abs=1e-9)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(output=outputs, wanted=gentle, free=st.sets(st.integers(0, 4)))
 @pytest.mark.parametrize('inverse', [exact_inverse, simplified_inverse])
 def test_each_axis_is_left_alone_by_itself(
@@ -354,7 +354,7 @@ def test_each_axis_is_left_alone_by_itself(
         assert direct.sum() == pytest.approx(0.0, abs=1e-9)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(output=outputs, wanted=rough, current=st.sampled_from([0.5, 7.0]))
 def test_the_papers_saturation_cuts_each_current_by_itself(
     output: np.ndarray, wanted: np.ndarray, current: float

@@ -52,7 +52,7 @@ def test_unforced_balance_and_its_unstable_poles() -> None:
     assert math.sqrt(slope) == pytest.approx(42.0, abs=0.3)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(
     turns=st.integers(100, 3000),
     charge=st.floats(5e5, 1.5e6),
@@ -73,7 +73,7 @@ def test_fields_superpose_for_any_machine(
     assert k_h == pytest.approx(expected, rel=1e-12)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(gap=GAPS, i_d=CURRENTS, i_q=CURRENTS)
 def test_vertical_force_is_minus_a_square_and_the_quadrature_part(
     gap: float, i_d: float, i_q: float
@@ -86,7 +86,7 @@ def test_vertical_force_is_minus_a_square_and_the_quadrature_part(
     assert motor.horizontal_force(MACHINE, gap, i_q) == pytest.approx(-k_h * i_q, rel=1e-12)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(gap=GAPS)
 def test_combined_functions_are_the_single_ones(gap: float) -> None:
     single = [f(MACHINE, gap) for f in (motor.L_v1, motor.L_v2, motor.L_v3, motor.L_h)]

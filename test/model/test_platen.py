@@ -61,7 +61,7 @@ def _accelerations(output: tuple[float, ...], i_d: list[float], i_q: list[float]
     return list(result)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(output=OUTPUTS, u_y=st.lists(CURRENT, min_size=4, max_size=4), u_x=CURRENT, u_z=CURRENT)
 def test_dynamics_are_the_printed_ones(
     output: tuple[float, ...], u_y: list[float], u_x: float, u_z: float
@@ -71,7 +71,7 @@ def test_dynamics_are_the_printed_ones(
     assert got == pytest.approx(expected, rel=1e-10, abs=1e-9)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     output=OUTPUTS,
     v=st.tuples(*[st.floats(-14.0, 14.0)] * 3),
@@ -94,7 +94,7 @@ def test_affine_form_is_the_full_model(
     assert float(c @ terms_c) == pytest.approx(full[4], rel=1e-9, abs=1e-7)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(
     output=OUTPUTS,
     i_d=st.lists(CURRENT, min_size=4, max_size=4),
@@ -116,7 +116,7 @@ def test_eight_independent_currents_act_where_their_motors_are(
     assert _accelerations(output, i_d, i_q) == pytest.approx(expected, rel=1e-10, abs=1e-9)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(output=OUTPUTS)
 def test_geometry_goes_there_and_back(output: tuple[float, ...]) -> None:
     gap, back = np.empty(4), np.empty(5)
@@ -137,7 +137,7 @@ def test_gaps_that_contradict_each_other() -> None:
     assert back[4] == 0.0
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(output=OUTPUTS)
 def test_the_geometry_of_arrays_is_the_same(output: tuple[float, ...]) -> None:
     position = np.array([output, output])

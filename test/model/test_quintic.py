@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from maglev_model.quintic import (
@@ -32,7 +32,6 @@ def fitted(start: np.ndarray, end: np.ndarray, duration: float) -> np.poly1d:
     return np.poly1d(np.linalg.solve(np.array(rows, dtype=float), np.concatenate([start, end])))
 
 
-@settings(deadline=None)
 @given(st.tuples(VALUES, VALUES, VALUES), st.tuples(VALUES, VALUES, VALUES), TIMES)
 def test_quintic_joins_two_states(
     start: tuple[float, ...], end: tuple[float, ...], duration: float
@@ -46,7 +45,6 @@ def test_quintic_joins_two_states(
         assert values[:, 0] == pytest.approx(wanted.deriv(order)(time), abs=1e-8 * scale)
 
 
-@settings(deadline=None)
 @given(VALUES, VALUES, VALUES, TIMES, st.floats(0.0, 1.2))
 def test_quintic_to_zero_is_the_same_curve(
     position: float, velocity: float, acceleration: float, duration: float, share: float
@@ -75,7 +73,6 @@ def test_minimum_jerk_is_the_quintic_between_rests() -> None:
     assert minimum_jerk_peaks(1.0, 1.0)[:2] == pytest.approx(peaks, rel=1e-4)
 
 
-@settings(deadline=None)
 @given(st.floats(1e-4, 1.0), st.floats(1e-3, 10.0), st.floats(1e-3, 10.0))
 def test_the_shortest_time_meets_one_bound(
     distance: float, velocity: float, acceleration: float
@@ -87,7 +84,6 @@ def test_the_shortest_time_meets_one_bound(
     assert transition_time(distance, acceleration, 0.0) <= time * (1.0 + 1e-12)
 
 
-@settings(deadline=None)
 @given(st.floats(0.0, 1.0), st.floats(-2.0, 2.0))
 def test_braking_stays_within_the_stops(position: float, velocity: float) -> None:
     start, speed = np.array([position]), np.array([velocity])

@@ -34,7 +34,7 @@ def inverse(
     return direct, quadrature, realised, limited
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(gaps, st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))
 def test_it_is_four_motors_that_carry_four_and_two_times_the_mass(
     gap: float, i_d: float, i_q: float
@@ -50,7 +50,7 @@ def test_it_is_four_motors_that_carry_four_and_two_times_the_mass(
     assert not single[2:].any()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(gaps, st.floats(-4.0, 4.0), st.floats(-3.0, 3.0))
 def test_the_inverse_inverts(gap: float, w_y: float, w_x: float) -> None:
     """By (1), (2) the currents give what was wanted, or what the inverse says they give."""
@@ -65,7 +65,7 @@ def test_the_inverse_inverts(gap: float, w_y: float, w_x: float) -> None:
         np.testing.assert_allclose([got, across], [w_y, w_x], rtol=1e-9, atol=1e-8)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(gaps, st.floats(-200.0, 9.8), st.floats(-500.0, 500.0))
 def test_levitation_comes_before_travel(gap: float, w_y: float, w_x: float) -> None:
     """Within the amplitude; i_q never costs the attraction that the platen needs."""
@@ -112,7 +112,7 @@ def wanted_quadrature(gap: float, w_x: float) -> float:
     return w_x * MACHINE.M_x / horizontal_force(MACHINE, gap, 1.0)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(gaps, st.floats(-150.0, 8.8), st.floats(-500.0, 500.0), st.sampled_from([PRIORITY, PLAIN]))
 def test_it_takes_the_most_i_q_that_there_is_room_for(
     gap: float, w_y: float, w_x: float, limits: CurrentLimits

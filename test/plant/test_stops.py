@@ -106,7 +106,7 @@ def test_between_the_stops_energy_is_kept_without_friction() -> None:
     assert np.ptp(_vertical_energy(moving, 0.0)) < 1e-9
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(y=st.floats(0.0185, 0.0309), speed=st.floats(-0.3, 0.3), i_d=st.floats(-1.0, 1.0))
 def test_impacts_never_add_energy(y: float, speed: float, i_d: float) -> None:
     stage = _stage(
@@ -148,7 +148,7 @@ CONE = st.tuples(
 )
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(target=CONE, radius=st.sampled_from([0.0, 0.05, 0.1, 0.397]), seed=st.integers(0, 1000))
 def test_contact_goes_to_the_nearest_point_of_the_allowed_set(
     target: tuple[float, float, float, bool], radius: float, seed: int

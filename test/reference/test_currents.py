@@ -48,7 +48,7 @@ def samples(position, velocity, acceleration):
         st.floats(-10.0, 10.0),
     ),
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_the_plant_accelerates_as_wanted(position, acceleration):
     velocity = np.array([0.1, -0.2, 0.0, 0.05, -0.05])
     direct, quadrature, possible = motor_currents(

@@ -51,7 +51,7 @@ def grid(start, end, seed=0):
 
 
 @given(st.floats(0.001, 0.05), st.floats(0.1, 30.0))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_a_circle_is_round_and_closes(radius, frequency):
     circle = Sinusoids.circle(CircleParameters(radius=radius, frequency=frequency), HOME, OMEGA)
     time = np.linspace(-1.0, 5.0, 300)
@@ -72,7 +72,7 @@ def test_a_circle_is_round_and_closes(radius, frequency):
     st.integers(1, 6),
     st.floats(0.5, 10.0),
 )
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_a_helix_lies_on_its_cone(radius, gap, turns, frequency):
     helix = Helix(
         HelixParameters(radius=radius, gap=gap, turns=turns, frequency=frequency), HOME, OMEGA
@@ -101,7 +101,7 @@ def test_a_helix_rises_evenly_between_its_ends():
 
 
 @given(st.floats(0.01, 0.1), st.floats(0.05, 0.99), st.floats(0.01, 0.5))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_a_square_has_constant_speed_and_its_corner_radius(side, share, speed):
     corner = 0.288 * side * share  # of the largest
     square = Square(SquareParameters(side=side, corner=corner, speed=speed), HOME)
@@ -128,7 +128,7 @@ def test_corners_larger_than_their_square_are_refused():
 
 
 @given(st.floats(1.0, 60.0), st.floats(1.0, 60.0), st.floats(0.5, 20.0))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_a_chirp_sweeps_evenly_and_ends_where_it_stands(start, end, duration):
     parameters = ChirpParameters(axis='z', amplitude=0.001, frequency=(start, end), time=duration)
     chirp = Chirp(parameters, HOME)
@@ -193,7 +193,7 @@ points = st.lists(
 
 
 @given(points, st.floats(0.0, 0.5), st.booleans())
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_waypoints_are_reached_at_rest_within_their_limits(points, dwell, repeat):
     y, x, z, phi, theta = zip(*points, strict=True)
     parameters = WaypointParameters(y=y, x=x, z=z, phi=phi, theta=theta, dwell=dwell, repeat=repeat)

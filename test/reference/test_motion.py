@@ -18,7 +18,7 @@ vectors = hnp.arrays(float, 5, elements=st.floats(-1.0, 1.0, width=32))
     st.tuples(vectors, vectors, vectors),
     st.floats(0.05, 5.0),
 )
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_quintic_is_the_hermite_polynomial(start, end, duration):
     quintic = Quintic(State(*start), State(*end), duration)
     time = np.linspace(0.0, duration, 23)
@@ -49,7 +49,7 @@ def test_quintic_needs_time():
 
 
 @given(st.floats(0.001, 0.1), st.floats(0.05, 5.0))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_peaks_of_the_minimum_jerk_move(distance, duration):
     end = np.array([-distance, distance, 0.0, 0.0, 0.0])
     quintic = Quintic(State.at_rest(np.zeros(5)), State.at_rest(end), duration)

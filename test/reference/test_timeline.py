@@ -190,7 +190,7 @@ def test_a_platen_that_is_not_on_its_stop_is_refused():
 
 
 @given(st.lists(st.integers(1, 700), min_size=1, max_size=12), st.integers(0, 3000))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_blocks_do_not_change_the_values(counts, first):
     timeline = Timeline(scenario('ellipse_4dof', **SHORT))
     expected = Timeline(scenario('ellipse_4dof', **SHORT)).block(0, 14000)
@@ -238,7 +238,7 @@ def test_an_unreachable_reference_is_refused_without_autostart_too():
 
 
 @given(st.integers(0, 4410))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_it_lands_smoothly_from_wherever_it_is(sample):
     parameters = scenario('ellipse_4dof', **SHORT)
     timeline = Timeline(parameters)

@@ -55,7 +55,7 @@ def test_one_channel_has_the_margin_of_its_own_loop() -> None:
     assert 1.0 / bound.max() == pytest.approx(control.disk_margins(system, omega)[0])
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(st.integers(0, 2**32 - 1))
 def test_the_bound_lies_above_every_perturbation_and_below_the_norm(seed: int) -> None:
     """Diagonal unitary U: the spectral radius of U M is at most the structured singular value."""

@@ -43,7 +43,7 @@ def _full_model(y: float, phi: float, theta: float, i_d: np.ndarray) -> np.ndarr
     return found[[0, 3, 4]]
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(GAP, PHI, THETA, INPUT, INPUT, INPUT)
 def test_contributions_add_up_to_the_full_model(
     y: float, phi: float, theta: float, v_y: float, v_phi: float, v_theta: float
@@ -54,7 +54,7 @@ def test_contributions_add_up_to_the_full_model(
     assert [parts[name].sum() for name in 'abc'] == pytest.approx(list(expected), abs=1e-9)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(GAP, PHI, THETA)
 def test_holding_inputs_hold_the_full_model(y: float, phi: float, theta: float) -> None:
     currents = direct_currents(holding_inputs(M, y, phi, theta))
@@ -62,7 +62,7 @@ def test_holding_inputs_hold_the_full_model(y: float, phi: float, theta: float) 
 
 
 @given(GAP)
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_hover_current_carries_the_weight(gap: float) -> None:
     current = hover_current(M, gap)
     assert 4.0 * vertical_force(M, gap, current, 0.0) == pytest.approx(-M.M_y * M.G, rel=1e-9)
@@ -77,7 +77,7 @@ def test_where_the_platen_cannot_be_carried_is_said() -> None:
         holding_inputs(weak, 0.02, 0.0, 0.0)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(GAP, PHI, THETA)
 def test_no_tilt_has_larger_terms_than_the_largest(y: float, phi: float, theta: float) -> None:
     largest, found = largest_terms(M, [y], TiltRange()), terms(M, y, phi, theta)

@@ -95,7 +95,7 @@ def test_placement_agrees_with_python_control(form: str, axis: str) -> None:
     np.testing.assert_allclose(gain, -ackermann, atol=1e-6 * scale)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     multiples=st.lists(st.integers(0, 6), max_size=6, unique=True),
     spread=st.floats(0.5, 3.0),

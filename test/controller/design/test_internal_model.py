@@ -25,7 +25,7 @@ def test_companion_form_is_equation_15() -> None:
 
 
 @pytest.mark.parametrize('form', ['companion', 'modal'])
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(multiples=multiples)
 def test_poles_are_the_frequencies(form: str, multiples: list[int]) -> None:
     """Φ has the eigenvalues ±iω of the list, and 0 once when it is in it."""

@@ -186,7 +186,7 @@ def test_linearisation_is_that_of_the_full_model(gap: float) -> None:
         np.testing.assert_allclose(accelerate(state, direct, quadrature), wanted, atol=2e-8)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.lists(st.floats(-300.0, 300.0), min_size=5, max_size=5))
 def test_what_the_linear_inverse_says_it_realises(wanted: list[float]) -> None:
     """Within limits always, and with the currents it returns its own linear model agrees."""

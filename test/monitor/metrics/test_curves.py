@@ -18,7 +18,7 @@ from maglev_monitor.metrics.run_metrics import RunMetrics
 from maglev_monitor.metrics.run_parameters import RunParameters
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(data=st.data())
 def test_bins_hold_least_greatest_and_first(data: st.DataObject) -> None:
     bins = 2 * data.draw(st.integers(1, 8))

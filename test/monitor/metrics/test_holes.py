@@ -57,7 +57,7 @@ def test_a_gap_of_whole_blocks_is_one_hole(records: dict[str, Records]) -> None:
     )
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     lost=st.dictionaries(
         st.sampled_from(['reference', 'measurement', 'currents', 'controller', 'plant']),

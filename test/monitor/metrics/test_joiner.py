@@ -61,7 +61,7 @@ def test_rows_hold_all_topics(run: Any, messages: dict[str, list[bytes]]) -> Non
     np.testing.assert_array_equal(rows['state'][:, 0:10:2], run.position)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(data=st.data())
 def test_order_and_bursts_do_not_matter(data: st.DataObject) -> None:
     size = data.draw(st.integers(1, 40))

@@ -169,7 +169,7 @@ def test_friction_grows_with_the_tilt_that_presses_the_guides() -> None:
     assert speeds[1] / speeds[0] == pytest.approx(1.0 + 50.0 * 0.01, rel=1e-9)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     velocity=st.floats(-0.5, 0.5),
     model=st.sampled_from(['tanh', 'coulomb', 'lugre']),

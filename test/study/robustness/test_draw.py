@@ -27,7 +27,7 @@ DRAWS = read_draws(PARAMS / 'robustness.yaml')
 PLANT, ROUGH = plant_of(PARAMS), plant_of(PARAMS, 'rough')
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(
     kind=st.sampled_from(['normal', 'lognormal', 'uniform']),
     centre=st.floats(1e-3, 1e3),
