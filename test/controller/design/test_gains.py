@@ -199,6 +199,14 @@ def test_discrete_model_is_the_sampled_continuous_one() -> None:
     assert not drive[2:].any()
 
 
+def test_without_an_antiwindup_observer_the_axis_speed_and_sample_time_are_named() -> None:
+    """Of two undamped oscillators nobody sees the second."""
+    turn = np.array([[0.0, 1.0], [-1.0, 0.0]])
+    two = np.kron(np.eye(2), turn)
+    with pytest.raises(ParameterError, match=r'phi: no anti-windup .* 1e-08 rad/s .* 0.001 s'):
+        following_gain(two, np.array([1.0, 0.0, 0.0, 0.0]), PERIOD, 1e-8, 'phi')
+
+
 def test_antiwindup_observer_lets_go_and_does_not_ring() -> None:
     """Φ_d − E κ is stable, faster for a larger speed."""
     design = design_axis(ControllerParameters(), 'x')

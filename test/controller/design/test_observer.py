@@ -23,6 +23,16 @@ def test_the_gain_is_python_controls(bandwidth: float) -> None:
     np.testing.assert_allclose(STEP @ found, ahead[:, 0], rtol=1e-6)
 
 
+@pytest.mark.parametrize('bandwidth', [1.0, 850.0, 1e5])
+@pytest.mark.parametrize('period', [*np.geomspace(1e-5, 1e-2, 12), 1.38e-4])
+def test_each_bandwidth_and_sample_time_has_its_gain(bandwidth: float, period: float) -> None:
+    """What the stationary Riccati equation says of them, in samples and readings' errors."""
+    position, speed = np.array(observer(bandwidth, period)) * [1.0, period]
+    ratio = (bandwidth * period) ** 4
+    assert speed**2 == pytest.approx(ratio * (1.0 - position), rel=1e-7, abs=1e-12 * ratio)
+    assert position**2 == pytest.approx(speed * (2.0 - position) - speed**2 / 6.0, rel=1e-9)
+
+
 def test_slow_ones_have_butterworths_poles() -> None:
     """Two poles at the bandwidth, 45 degrees off the axis."""
     gain = np.array(observer(50.0, PERIOD))

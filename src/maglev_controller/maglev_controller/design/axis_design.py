@@ -6,7 +6,7 @@ import dataclasses
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import solve_discrete_are
+from scipy.linalg import LinAlgError, solve_discrete_are
 
 from maglev_controller.design.derivative import DerivativeFilter
 from maglev_controller.design.digits import rounded
@@ -15,6 +15,7 @@ from maglev_controller.design.notch import Notch, notch_system
 from maglev_controller.design.observer import NO_OBSERVER, Observer
 from maglev_controller.design.state_space import StateSpace
 from maglev_model.axes import FloatArray
+from maglev_model.parameters import ParameterError
 
 _DIGITS = {'gain': 8, 'drive': 8, 'antiwindup': 8, 'transition': 13}  # oscillators must not decay
 
@@ -148,21 +149,27 @@ def controller_system(design: AxisDesign, period: float, delay: int) -> StateSpa
 
 
 def following_gain(
-    transition: FloatArray, output: FloatArray, period: float, speed: float
+    transition: FloatArray, output: FloatArray, period: float, speed: float, axis: str = 'axis'
 ) -> FloatArray:
     """Anti-windup gain E_d (n,) that makes a compensator's state follow what was realised.
 
     While w is limited, ξ⁺ = Φ_d ξ + N_d e + E_d (sat w − w) has the matrix Φ_d − E_d κ, κ the
     ``output`` (n,): an observer of ξ from the realised w. E_d is the stationary Kalman gain for
     process noise of size ``speed`` [rad/s] through κ's direction; the larger, the faster the state
-    lets go.
+    lets go. Raises :class:`ParameterError`, naming the axis, when there is none.
     """
     scale = np.linalg.norm(output)
     if scale == 0.0:
         return np.zeros(output.size)
     direction = output / scale
     noise = np.eye(output.size) * (speed * period) ** 2
-    solution = solve_discrete_are(transition.T, direction[:, None], noise, np.eye(1))
+    try:
+        solution = solve_discrete_are(transition.T, direction[:, None], noise, np.eye(1))
+    except (LinAlgError, ValueError) as error:
+        raise ParameterError(
+            f'{axis}: no anti-windup follows at internal_model.antiwindup_speed of {speed:g} rad/s '
+            f'with a sample time of {period:g} s ({error})'
+        ) from error
     return np.asarray(
         transition @ solution @ direction / (1.0 + direction @ solution @ direction) / scale
     )

@@ -65,7 +65,7 @@ def shaped_axis(
     antiwindup = np.zeros(sampled.input.size)
     if parameters.internal_model.antiwindup == 'observer':
         speed = parameters.internal_model.antiwindup_speed
-        antiwindup = following_gain(sampled.state, gain[2:], period, speed)
+        antiwindup = following_gain(sampled.state, gain[2:], period, speed, axis)
     derivative = parameters.derivative
     return AxisDesign(
         gain=gain,

@@ -11,7 +11,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import solve_discrete_are
 
 
 class Observer(NamedTuple):
@@ -30,10 +29,15 @@ def observer(bandwidth: float, period: float) -> Observer:
     ``bandwidth`` ω [rad/s] is the one figure there is: ω⁴ is the spectral density of the unknown
     acceleration by that of the measurement's error. The filter's poles lie on a circle of that
     radius, Butterworth's, as long as that is far below the sample rate.
+
+    They are the factors inside the unit circle of the measurement's sampled spectrum, a cubic
+    B-spline's above the error's: u² + (ωT)⁴ (1 + u / 6) = 0 with u = z − 2 + 1 / z.
     """
-    state = np.array([[1.0, period], [0.0, 1.0]])
-    noise = bandwidth**4 * np.array([[period**3 / 3.0, period**2 / 2.0], [period**2 / 2.0, period]])
-    seen, reading = np.eye(2, 1), 1.0 / period
-    covariance = solve_discrete_are(state.T, seen, noise, np.array([[reading]]))
-    position, velocity = covariance[:, 0] / (covariance[0, 0] + reading)
-    return Observer(float(position), float(velocity))
+    ratio = (bandwidth * period) ** 4
+    larger = -ratio / 12.0 - np.sqrt(complex(ratio**2 / 144.0 - ratio))
+    u = np.array([larger, ratio / larger])
+    away = u / 2.0 + np.sqrt(u + u**2 / 4.0) * np.array([[1.0], [-1.0]])  # z − 1
+    outside = away[np.argmax(np.abs(1.0 + away), axis=0), [0, 1]]
+    first, second = -outside / (1.0 + outside)
+    speed = (first * second).real
+    return Observer(float(-(first + second).real - speed), float(speed / period))

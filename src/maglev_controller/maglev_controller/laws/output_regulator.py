@@ -76,7 +76,7 @@ def _design(parameters: ControllerParameters, chosen: AxisParameters, axis: str)
     if shared.antiwindup == 'paper':
         antiwindup = driven[:, 1]
     elif shared.antiwindup == 'observer':
-        antiwindup = following_gain(transition, gain[2:], period, shared.antiwindup_speed)
+        antiwindup = following_gain(transition, gain[2:], period, shared.antiwindup_speed, axis)
     watched = parameters.rate_estimate == 'observer'
     return AxisDesign(
         gain=gain,
