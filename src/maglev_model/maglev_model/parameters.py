@@ -22,6 +22,7 @@ from typing import Any, TypeVar
 import yaml
 
 from maglev_model import ros_yaml
+from maglev_model.node_only import NODE_ONLY
 
 T = TypeVar('T')
 
@@ -326,12 +327,20 @@ def _absolute(name: str) -> str:
 
 
 def from_yaml(cls: type[T], node: str, *paths: str | Path) -> T:
-    """Build a node's table from ROS parameter files, the later winning; raises as :func:`build`."""
+    """Build a node's table from ROS parameter files, the later winning; raises as :func:`build`.
+
+    What only the node itself has is left in the files where the table has nothing of it.
+    """
     overrides: dict[str, object] = {}
     for path in paths:
         overrides.update(read_yaml(path, node))
     known = specs(cls)
-    return build(cls, {k: v for k, v in overrides.items() if not for_others(k, known)})
+
+    def others(name: str) -> bool:
+        of_the_node = name.partition('.')[0] in NODE_ONLY.get(node, ())
+        return for_others(name, known) or (of_the_node and name not in known)
+
+    return build(cls, {k: v for k, v in overrides.items() if not others(k)})
 
 
 def differing(instance: Any) -> dict[str, tuple[object, object]]:
