@@ -164,3 +164,24 @@ def test_a_bag_that_was_cut_off_differs_and_says_so(make_bag: MakeBag, capsys: A
     captured = capsys.readouterr()
     assert 'was cut off' in captured.err
     assert 'only in the first from sample' in captured.out
+
+
+def test_fields_that_only_one_has_are_named(
+    make_bag: MakeBag, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    """As of a bag of an older version."""
+    first, second = make_bag('a'), make_bag('b')
+    read = Bag.batches
+
+    def older(bag: Bag) -> Any:
+        for batch in read(bag):
+            if bag.path == second and 'measurement' in batch.samples:
+                kept = batch.samples['measurement']
+                batch.samples['measurement'] = kept[[n for n in kept.dtype.names if n != 'gap']]
+            yield batch
+
+    monkeypatch.setattr(Bag, 'batches', older)
+    for bags, side in (((first, second), 'the first'), ((second, first), 'the second')):
+        assert compare_bags([*map(str, bags)]) == EQUAL
+        told = f'  not compared, for only {side} has it: gap'
+        assert capsys.readouterr().out.splitlines().count(told) == 1

@@ -34,11 +34,15 @@ class FieldDifference:
 
 @dataclasses.dataclass
 class TopicComparison:
-    """One topic in two bags: samples in both, numbers of those in one only, fields that differ."""
+    """One topic in two bags: samples in both, numbers of those in one only, fields that differ.
+
+    ``fields`` are those that messages of one have and the other's have not, which compares nothing.
+    """
 
     both: int = 0
     only: tuple[list[int], list[int]] = dataclasses.field(default_factory=lambda: ([], []))
     differences: dict[str, FieldDifference] = dataclasses.field(default_factory=dict)
+    fields: tuple[set[str], set[str]] = dataclasses.field(default_factory=lambda: (set(), set()))
 
     @property
     def equal(self) -> bool:
@@ -141,8 +145,11 @@ def _compare(
     comparison.only[1].extend(np.delete(second['sequence'], right).tolist())
     if not len(numbers):
         return
+    names = [{*(side.dtype.names or ())}.difference(ignored) for side in (first, second)]
+    comparison.fields[0].update(names[0] - names[1])
+    comparison.fields[1].update(names[1] - names[0])
     for name in first.dtype.names or ():
-        if name not in ignored and name in (second.dtype.names or ()):
+        if name in names[0] & names[1]:
             difference = _difference(first[name][left], second[name][right], tolerance)
             _note(comparison, name, numbers, difference)
 

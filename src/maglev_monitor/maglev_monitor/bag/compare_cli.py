@@ -95,6 +95,9 @@ def _lines(key: str, topic: TopicComparison, tolerance: float) -> Iterator[str]:
     same = 'equal bit by bit' if tolerance == 0.0 else f'equal within {tolerance:g}'
     verdict = f'{len(topic.differences)} fields differ' if topic.differences else same
     yield f'{key}: {topic.both} samples in both{", " + only if only else ""}: {verdict}'
+    for names, side in zip(topic.fields, ('the first', 'the second'), strict=True):
+        if names:
+            yield f'  not compared, for only {side} has it: {", ".join(sorted(names))}'
     for name, field in topic.differences.items():
         yield (
             f'  {name}: {field.samples} samples differ, first {field.first},'
