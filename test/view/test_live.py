@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from maglev_view.parameters import WebParameters
 from maglev_view.web.guard import trusted
 from maglev_view.web.live import Live
 from maglev_view.web.panel import motors_html, status_html
+from maglev_view.web.server import address
 
 SAMPLES = 400
 
@@ -114,3 +116,15 @@ def test_the_load_of_a_real_amplifier_comes_from_its_diagnostics(live: Live) -> 
 )
 def test_only_our_own_page_may_ask(headers: dict[str, str], expected: bool) -> None:
     assert trusted(headers) is expected
+
+
+@pytest.mark.parametrize(
+    ('host', 'expected'),
+    [
+        ('127.0.0.1', 'http://127.0.0.1:80'),
+        ('::1', 'http://[::1]:80'),
+        ('stage', 'http://stage:80'),
+    ],
+)
+def test_the_address_is_one_that_a_browser_takes(host: str, expected: str) -> None:
+    assert address(SimpleNamespace(get_host=lambda: host, get_port=lambda: 80)) == expected

@@ -16,7 +16,7 @@ from maglev_view.web.guard import trusted
 from maglev_view.web.live import Live
 from maglev_view.web.panel import motors_html, status_html
 from maglev_view.web.scene import StageScene
-from maglev_view.web.server import FITTING, serve, stop
+from maglev_view.web.server import FITTING, address, serve, stop
 
 BUTTONS = {
     'Lift off': None,
@@ -85,7 +85,7 @@ class Page:
     @property
     def address(self) -> str:
         """Where the page is."""
-        return f'http://{self._server.get_host()}:{self._server.get_port()}'
+        return address(self._server)
 
     def close(self) -> None:
         """Serve it no more."""

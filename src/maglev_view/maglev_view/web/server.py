@@ -47,6 +47,12 @@ def serve(host: str, port: int, title: str = '') -> Any:
     return server
 
 
+def address(server: Any) -> str:
+    """Where a browser finds it."""
+    host = str(server.get_host())
+    return f'http://{f"[{host}]" if ":" in host else host}:{server.get_port()}'
+
+
 def stop(server: Any) -> None:
     """End it, likewise without a word."""
     with contextlib.redirect_stdout(io.StringIO()):
