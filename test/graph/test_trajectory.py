@@ -13,10 +13,10 @@ from maglev_node.topics import REFERENCE, TRUE_STATE
 HOVERING = ('trajectory:=hold', 'duration:=600.0', 'run_in:=0.0', 'move_time:=0.3')
 
 
-def to_x(goal: float) -> JointTrajectory:
-    """A move of x in half a second."""
+def to_x(goal: float, seconds: int = 0) -> JointTrajectory:
+    """A move of x in half a second, or so many more."""
     point = JointTrajectoryPoint(positions=[goal])
-    point.time_from_start.nanosec = 500_000_000
+    point.time_from_start.sec, point.time_from_start.nanosec = seconds, 500_000_000
     return JointTrajectory(joint_names=['x'], points=[point])
 
 
@@ -53,5 +53,11 @@ def test_it_is_followed_from_the_hover_or_refused(nodes: Nodes, watching: Observ
     settles(watching, 0, 0.024)
     assert watching.newest(TRUE_STATE).state[0] == pytest.approx(0.024, abs=5e-5)
     assert watching.newest(TRUE_STATE).state[2] == pytest.approx(0.01, abs=5e-5)
+    publisher.publish(to_x(0.0, seconds=3600))  # takes longer to check than the next to come
+    assert publisher.wait_for_all_acked()
+    assert watching.ask(client, Step.Request(axis='y', distance=0.001)).success
+    reference.wait_for('refused: before it was checked another motion came', timeout=60.0)
+    settles(watching, 0, 0.025)
+    assert watching.newest(REFERENCE).position[1] == pytest.approx(0.01)
     assert watching.call('/reference/land').success
     reference.wait_for('END at sample', timeout=60.0)

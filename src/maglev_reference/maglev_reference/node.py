@@ -296,9 +296,16 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
             message = deserialize_message(data, JointTrajectory)
             if message.header.stamp.sec or message.header.stamp.nanosec:
                 raise UnreachableError('header.stamp must be 0: it starts at once')
-            self._run.propose(message.joint_names, [_point(each) for each in message.points])
+            points = [_point(each) for each in message.points]
+            replaces = self._run.propose(message.joint_names, points)
         except UnreachableError as error:
             self.get_logger().error(f'trajectory refused: {error}')
+        else:
+            self._tell_of_replacement(replaces)
+
+    def _tell_of_replacement(self, replaces: bool) -> None:
+        if replaces:
+            self.get_logger().error('trajectory refused: before it was checked another motion came')
 
     def _consider(self) -> None:
         try:
@@ -341,7 +348,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
     def _step(self, request: Any, response: Any) -> Any:
         """Answered when it is checked; in between, what is due goes out."""
         try:
-            self._run.propose_step(request.axis, request.distance)
+            self._tell_of_replacement(self._run.propose_step(request.axis, request.distance))
             while (length := self._run.consider()) is None:
                 self._take_measurement()
                 self._publish()

@@ -203,19 +203,24 @@ class ReferenceRun:
         self.left = ''
         return True
 
-    def propose(self, names: Sequence[str], points: Sequence[Point]) -> None:
+    def propose(self, names: Sequence[str], points: Sequence[Point]) -> bool:
         """Take a trajectory in, to be followed from the hover once :meth:`consider` has checked it.
 
-        Raises UnreachableError where it makes no motion, and while the platen does not hover.
+        Returns whether it takes the place of another that is not checked yet. Raises
+        UnreachableError where it makes no motion, and while the platen does not hover.
         """
         hover = self._hover()
-        self._candidate = Candidate(Through(names, points, hover), hover, self._parameters)
+        return self._take(Candidate(Through(names, points, hover), hover, self._parameters))
 
-    def propose_step(self, axis: str, distance: float) -> None:
+    def propose_step(self, axis: str, distance: float) -> bool:
         """The same for a step of one axis by a ``distance`` [m, rad]."""
         hover = self._hover()
         motion = step(axis, distance, hover, self._parameters)
-        self._candidate = Candidate(motion, hover, self._parameters)
+        return self._take(Candidate(motion, hover, self._parameters))
+
+    def _take(self, candidate: Candidate) -> bool:
+        before, self._candidate = self._candidate, candidate
+        return before is not None
 
     def consider(self) -> float | None:
         """Check some more of what was proposed; its length [s] when it is followed from now on.
