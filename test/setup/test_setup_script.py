@@ -242,6 +242,16 @@ def test_a_full_disk(machine: Machine) -> None:
     assert 'only 57 MB are free' in machine.refusal()
 
 
+@pytest.mark.parametrize('locale', ['C', 'C.UTF-8'])
+@pytest.mark.parametrize('letter', ['ü', '機'])
+def test_a_folder_name_with_a_letter_ros_cannot_build_in(
+    machine: Machine, tmp_path: Path, letter: str, locale: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv('LC_ALL', locale)
+    machine.root = machine.root.rename(tmp_path / f'a{letter}clone')
+    assert 'has a letter in its name that is not ASCII' in machine.refusal()
+
+
 @pytest.mark.parametrize('sign', [*' :\'"`$&;#()<>[]{}|*?\\'])
 def test_a_folder_name_ros_cannot_build_in(machine: Machine, tmp_path: Path, sign: str) -> None:
     machine.root = machine.root.rename(tmp_path / f'a{sign}clone')
