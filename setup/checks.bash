@@ -61,11 +61,9 @@ choose_branch() {
 }
 
 check_place() {
-  local unfit="[][:space:]:'"'"`$&;#()<>{}|*?\\[]' LC_ALL=C
-  [[ $root != *$unfit* ]] || fail "the folder '$root' has a space, colon, quote, bracket or other" \
-    'sign of the shell in its name, which ROS cannot build in: move it'
-  [[ $root != *[^[:print:]]* ]] || fail "the folder '$root' has a letter in its name that is not" \
-    'ASCII, which ROS cannot build in: move it'
+  local LC_ALL=C
+  [[ $root != *[^A-Za-z0-9._+@~/-]* ]] || fail "the folder '$root' has a sign in its name that ROS" \
+    'cannot build with, it takes ASCII letters, digits and . _ - + @ ~: move it'
   [[ -w $root ]] || fail "cannot write to $root: make it writable, or clone elsewhere"
   command -v flock >/dev/null || fail "flock is missing: $(install_hint util-linux util-linux-core)"
   [[ $branch == native ]] || check_wheels_machine

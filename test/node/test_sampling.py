@@ -11,9 +11,10 @@ from made_up_stage import MadeUpStage, currents, start, start_realtime
 from rosgraph_msgs.msg import Clock
 
 from maglev_model.stage import StageError
+from maglev_model.wire import KEPT
 from maglev_msgs.msg import Measurement, PlantState
 from maglev_node.sampling import Sampling
-from maglev_node.topics import KEPT, MEASUREMENT, TRUE_STATE
+from maglev_node.topics import MEASUREMENT, TRUE_STATE
 
 
 def test_lockstep_repeats_the_first_sample_and_waits_for_each_answer() -> None:

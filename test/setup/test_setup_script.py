@@ -243,26 +243,20 @@ def test_a_full_disk(machine: Machine) -> None:
 
 
 @pytest.mark.parametrize('locale', ['C', 'C.UTF-8'])
-@pytest.mark.parametrize('letter', ['ü', '機'])
-def test_a_folder_name_with_a_letter_ros_cannot_build_in(
-    machine: Machine, tmp_path: Path, letter: str, locale: str, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize('sign', [*' :\'"`$&;#()<>[]{}|*?\\,=%^!\tü機'])
+def test_a_folder_name_ros_cannot_build_in(
+    machine: Machine, tmp_path: Path, sign: str, locale: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv('LC_ALL', locale)
-    machine.root = machine.root.rename(tmp_path / f'a{letter}clone')
-    assert 'has a letter in its name that is not ASCII' in machine.refusal()
-
-
-@pytest.mark.parametrize('sign', [*' :\'"`$&;#()<>[]{}|*?\\'])
-def test_a_folder_name_ros_cannot_build_in(machine: Machine, tmp_path: Path, sign: str) -> None:
     machine.root = machine.root.rename(tmp_path / f'a{sign}clone')
     line = machine.refusal()
-    assert f"'{machine.root}' has a space, colon, quote, bracket or other sign" in line
+    assert f"'{machine.root}' has a sign in its name that ROS cannot build with" in line
 
 
 @needs_wheels
 def test_a_folder_name_ros_can_build_in(machine: Machine, tmp_path: Path) -> None:
     (machine.bin / 'make').unlink()
-    machine.root = machine.root.rename(tmp_path / 'größe-1.2_a+b,c=d@e~f^g%h!')
+    machine.root = machine.root.rename(tmp_path / 'Gr-1.2_a+b@c~d')
     assert 'missing: make' in machine.refusal()
 
 

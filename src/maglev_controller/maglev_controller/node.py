@@ -18,6 +18,7 @@ from maglev_model.controller_watch import NOBODY
 from maglev_model.modes import Mode
 from maglev_model.parameters import build, parameter, specs, values
 from maglev_model.phases import Phase
+from maglev_model.wire import KEPT
 from maglev_node.graph_guard import GraphGuard, Watchers
 from maglev_node.mode_check import mode_conflict
 from maglev_node.node import MaglevNode, SourceParameters
@@ -26,7 +27,6 @@ from maglev_node.topics import (
     CONTROLLER_PROGRESS,
     CONTROLLER_STATE,
     CURRENTS,
-    KEPT,
     MEASUREMENT,
     REFERENCE,
     SAMPLE_TOPICS,

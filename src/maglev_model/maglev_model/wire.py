@@ -116,6 +116,13 @@ KEY_OF_MESSAGE_TYPE = {topic.message_type: key for key, topic in TOPIC_TYPES.ite
 PROGRESS_SUFFIX = '/progress'
 """How the names of topics end that repeat a part of another's messages."""
 
+KEPT = {'lockstep': 16384, 'realtime': 4096}
+"""Samples that a publisher keeps for readers that are busy, by mode.
+
+Seconds in both. A reader that has gone without a word, or was stopped, acknowledges none of them,
+and the more there are, the longer takes a publish, whose time in real time is short.
+"""
+
 _ENCAPSULATION = b'\x00\x01\x00\x00'  # plain CDR, little endian
 _FRAME_ID_LENGTH = slice(12, 16)
 _STRUCT_CODES = {'i4': 'i', 'u1': 'B', 'u4': 'I', 'u8': 'Q', 'f8': 'd', 'b1': '?'}

@@ -9,11 +9,12 @@ from rosgraph_msgs.msg import Clock
 
 from maglev_model.controller_watch import NOBODY
 from maglev_model.stage import EncoderSample, Truth
+from maglev_model.wire import KEPT
 from maglev_node.graph_guard import Watchers
 from maglev_node.node import MaglevNode, SourceParameters
 from maglev_node.samples import ProgressWriter, SampleWriter
 from maglev_node.stamp import set_stamp
-from maglev_node.topics import CLOCK, KEPT, MEASUREMENT, STAGE_PROGRESS, TRUE_STATE, sample_qos
+from maglev_node.topics import CLOCK, MEASUREMENT, STAGE_PROGRESS, TRUE_STATE, sample_qos
 
 _CLOCK_SAMPLES = 10
 """Samples from one message on ``clock`` to the next."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from maglev_model.wire import KEY_OF_MESSAGE_TYPE, PROGRESS_SUFFIX
+from maglev_model.wire import KEPT, KEY_OF_MESSAGE_TYPE, PROGRESS_SUFFIX
 from maglev_msgs.msg import ControllerState, Currents, Measurement, PlantState, Reference
 
 MEASUREMENT = 'stage/measurement'
@@ -45,14 +45,6 @@ PROGRESS_PERIOD = 16
 def sampled(topic: str) -> str:
     """The sample topic whose messages are on a topic: itself, but for those of progress."""
     return PROGRESS.get(topic, topic)
-
-
-KEPT = {'lockstep': 16384, 'realtime': 4096}
-"""Samples that a publisher keeps for readers that are busy, by mode.
-
-Seconds in both. A reader that has gone without a word, or was stopped, acknowledges none of them,
-and the more there are, the longer takes a publish, whose time in real time is short.
-"""
 
 
 def sample_qos(depth: int = KEPT['lockstep']) -> QoSProfile:

@@ -19,6 +19,7 @@ from maglev_model.geometry import outputs_of_gaps
 from maglev_model.modes import Mode
 from maglev_model.parameters import parameter
 from maglev_model.phases import Phase
+from maglev_model.wire import KEPT
 from maglev_msgs.srv import Step
 from maglev_node.graph_guard import GraphGuard, Watchers
 from maglev_node.mode_check import mode_conflict
@@ -26,7 +27,6 @@ from maglev_node.node import MaglevNode, SourceParameters
 from maglev_node.samples import SampleQueue, SampleWriter
 from maglev_node.topics import (
     CONTROLLER_PROGRESS,
-    KEPT,
     PROGRESS_PERIOD,
     REFERENCE,
     STAGE_PROGRESS,

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from maglev_model.phases import Phase
-from maglev_model.wire import TOPIC_TYPES
+from maglev_model.wire import KEPT, TOPIC_TYPES
 from maglev_monitor.metrics.decoding import Records, decode
 from maglev_monitor.metrics.joiner import Joiner
 
@@ -106,6 +106,20 @@ def test_a_topic_that_never_comes_does_not_hold_the_rest_back() -> None:
         assert len(joiner._pending) <= 5
     np.testing.assert_array_equal(present(blocks, 'measurement'), np.arange(170))
     assert len(present(blocks, 'plant')) == 0
+
+
+@pytest.mark.parametrize('behind', [4500, KEPT['lockstep'] - 1])
+def test_what_a_publisher_still_keeps_is_waited_for(behind: int) -> None:
+    joiner = Joiner()
+    for key in KEYS:
+        joiner.add(key, records_for(key, range(203)))
+    for key in ('reference', 'measurement', 'currents', 'controller'):
+        joiner.add(key, records_for(key, range(203, 203 + behind)))
+    blocks = list(joiner.take())
+    joiner.add('plant', records_for('plant', range(203, 203 + behind)))
+    blocks += joined(joiner)
+    assert joiner.dropped == 0
+    np.testing.assert_array_equal(present(blocks, 'plant'), np.arange(203 + behind))
 
 
 def test_what_comes_too_late_or_twice_is_counted() -> None:

@@ -22,7 +22,8 @@ from maglev_monitor.metrics.joiner import Joiner
 from maglev_monitor.metrics.run_metrics import RunMetrics
 from maglev_monitor.metrics.run_parameters import RunParameters
 
-_END_GRACE = 0.5  # for the last messages of topics that lag behind [s]
+_END_GRACE = 0.5  # for the last messages of topics [s]
+_LAG_GRACE = 4.0  # on top, for a topic that came and lags behind the end [s]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -98,7 +99,9 @@ class RunWatch:
             self._conclude_at = now + _END_GRACE
         if ended and all(number > (end or 0) for number in newest.values()):
             return True
-        return self._conclude_at is not None and now > self._conclude_at
+        lags = ended and any(0 <= number < (end or 0) for number in newest.values())
+        grace = _LAG_GRACE if lags else 0.0
+        return self._conclude_at is not None and now > self._conclude_at + grace
 
     def _has_failed(self, now: float) -> bool:
         """Whether a fault of the run is known for the first time."""

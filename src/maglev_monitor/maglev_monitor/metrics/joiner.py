@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from maglev_model.phases import Phase
-from maglev_model.wire import TOPIC_TYPES
+from maglev_model.wire import KEPT, TOPIC_TYPES
 from maglev_monitor.metrics.decoding import Records, stamps
 
 _COLUMNS: dict[str, tuple[tuple[str, str], ...]] = {
@@ -63,6 +63,7 @@ it).
 """
 
 
+_ABSENT = 4000  # a topic of which nothing has come within so many samples is none of the run's
 _ON_ITS_WAY = 100  # a topic that is further behind than this has stopped [samples]
 
 
@@ -70,14 +71,15 @@ class Joiner:
     """Joins records of the five topics into rows by sample number.
 
     A block is handed out when every topic has gone past its end, or when the stage is ``window``
-    samples past it (a topic that never comes, or a lost message, must not hold the rest back).
-    Later arrivals for a block handed out already are dropped and counted.
+    samples past it (a topic that never comes, or has stopped, must not hold the rest back). Later
+    arrivals for a block handed out already are dropped and counted.
 
     :param block: rows in a block.
-    :param window: samples to wait for a topic that lags behind.
+    :param window: samples to wait for a topic that lags behind: by default all that its publisher
+        keeps; for one of which nothing has come, 4000 at most.
     """
 
-    def __init__(self, block: int = 500, window: int = 4000) -> None:
+    def __init__(self, block: int = 500, window: int = KEPT['lockstep']) -> None:
         if block < 1 or window < 0:
             raise ValueError(f'block is {block} and window {window}: need block >= 1, window >= 0')
         self._size = block
@@ -116,12 +118,14 @@ class Joiner:
 
     def take(self) -> Iterator[Records]:
         """Hand out complete blocks, in order: arrays of :data:`ROW`, shape (block,)."""
-        slowest = min(self._newest.values())
-        overdue = max(self._newest['measurement'], self._newest['currents']) - self._window
+        stage = max(self._newest['measurement'], self._newest['currents'])
+        absent = stage - min(self._window, _ABSENT)
+        last = min(
+            max(n, stage - self._window if n >= 0 else absent) for n in self._newest.values()
+        )
         while self._pending:
             number = min(self._pending)
-            end = (number + 1) * self._size
-            if end - 1 > slowest and end - 1 > overdue:
+            if (number + 1) * self._size - 1 > last:
                 return
             yield self._hand_out(number)
 
