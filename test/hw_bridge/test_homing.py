@@ -10,7 +10,9 @@ from made_up import Clock, refusing
 from wired import bridge
 
 from maglev_hw_bridge.encoders import HomingError
-from maglev_hw_bridge.stage import Mode
+from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.stage import BridgeStage, Mode
+from maglev_model.parameters import ParameterError, build
 from maglev_model.stage import Fault, StageError
 
 
@@ -122,3 +124,20 @@ def test_what_keeps_it_from_a_lift_is_all_that_is_said() -> None:
         stage.home()
     assert not stage.encoders.homed
     assert stage.fault is None
+
+
+@pytest.mark.parametrize(
+    ('given', 'name'),
+    [
+        ({'homing.x': 0.0506}, r'homing\.x.*0\.0506 m, beyond the stops'),
+        ({'homing.z': -0.0406, 'machine.z_max': 0.04}, r'homing\.z.*-0\.0406 m, beyond the stops'),
+        ({'machine.gap_max': 0.033, 'homing.x': 0.0}, r'fault\.gap_upper.*0\.032 m.*rests at'),
+    ],
+)
+def test_a_home_where_no_platen_rests_is_refused(given: dict[str, float], name: str) -> None:
+    with pytest.raises(ParameterError, match=name):
+        BridgeStage(build(BridgeParameters, given))
+
+
+def test_a_home_at_the_stops_may_be_beyond_them_within_tolerances() -> None:
+    build(BridgeParameters, {'homing.x': 0.0505, 'homing.z': -0.0505}).check_homing()

@@ -128,3 +128,8 @@ def test_the_expiry_of_the_outputs_where_a_card_can_do_better() -> None:
     driver.open()
     with pytest.raises(CallError, match='0 V'):  # not a Q8
         driver.start()
+
+
+def test_one_board_is_not_two() -> None:
+    with pytest.raises(ParameterError, match=r"boards\.identifier' names board '7' twice"):
+        build(BridgeParameters, {'boards.identifier': ['7', '7']})

@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.parameters import BEYOND_STOPS, BridgeParameters
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import borrowing
@@ -16,7 +16,6 @@ from maglev_model.records import Block, Record
 CountArray = NDArray[np.int32]
 
 _HALF = 2**31
-_DOUBT = 5e-4  # how far beyond the stops an encoder may read before it is disbelieved [m]
 
 
 class HomingError(RuntimeError):
@@ -77,7 +76,7 @@ class Encoders:
     def beyond_stops(self) -> str:
         """Which encoder reads what the stops do not let the platen be; empty: none."""
         length = self.arrays.length
-        wrong = np.flatnonzero((length < self._lower - _DOUBT) | (length > self._upper + _DOUBT))
+        wrong = np.flatnonzero((length < self._lower - BEYOND_STOPS) | (length > self._upper + BEYOND_STOPS))
         if not len(wrong):
             return ''
         name, value = ENCODER_NAMES[wrong[0]], length[wrong[0]]

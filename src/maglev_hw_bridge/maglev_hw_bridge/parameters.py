@@ -16,6 +16,9 @@ from maglev_model.machine import MachineParameters
 from maglev_model.parameters import ParameterError, group, parameter
 from maglev_plant.effects.parameters import EffectParameters
 
+BEYOND_STOPS = 5e-4
+"""How far beyond its stops a platen may be, within tolerances [m]."""
+
 _BY_AXIS = ', by axis y, x, z, phi, theta'
 
 
@@ -230,7 +233,22 @@ class BridgeParameters:
             )
 
     def check_homing(self) -> None:
-        """Refuse to home real boards at the start. Raises ParameterError."""
+        """Refuse a home that no platen rests at, and one at the start with real boards.
+
+        Raises ParameterError.
+        """
+        for axis in ('x', 'z'):
+            home, stop = getattr(self.homing, axis), getattr(self.machine, f'{axis}_max')
+            if abs(home) > stop + BEYOND_STOPS:
+                raise ParameterError(
+                    f"parameter 'homing.{axis}' is {home:g} m, beyond the stops at plus and minus "
+                    f"'machine.{axis}_max' ({stop:g} m)"
+                )
+        if self.fault.gap_upper < self.machine.gap_max:
+            raise ParameterError(
+                f"parameter 'fault.gap_upper' is {self.fault.gap_upper:g} m, but the platen rests "
+                f"at 'machine.gap_max' ({self.machine.gap_max:g} m)"
+            )
         if self.homing.at_start and self.driver != 'emulated':
             raise ParameterError(
                 f"parameter 'homing.at_start' is true with driver '{self.driver}': only an emulated"

@@ -293,7 +293,12 @@ class BoardParameters:
     )
 
     def __post_init__(self) -> None:
-        """Refuse an enable line that a watchdog which expires would turn on, and shared lines."""
+        """Refuse one board twice, an enable line that expiry would turn on, and shared lines."""
+        if self.identifier[0] == self.identifier[1]:
+            raise ParameterError(
+                f"parameter 'boards.identifier' names board '{self.identifier[0]}' twice, the "
+                'bridge drives two'
+            )
         if self.enable_output < 0:
             return
         if self.enable_output == self.stop_input:
