@@ -194,6 +194,17 @@ def test_a_machine_that_is_right_has_no_fault_any_more(tmp_path: Path) -> None:
     assert memory.recall().fault is None
 
 
+def test_a_last_line_that_fails_is_not_proven_any_more(tmp_path: Path) -> None:
+    claimed, memory = remembered(tmp_path, 0.0, **LINES)
+    parameters = build(BridgeParameters, claimed)
+    with pytest.raises(StoppedError):
+        commission(claimed, ends_at('home'))
+    assert memory.proven(parameters)
+    with pytest.raises(WrongError, match=r'boards\.stop_input \(0\) is another line'):
+        commission({**claimed, 'emulation.wiring.stop_line': 5})
+    assert not memory.proven(parameters)
+
+
 def test_hot_amplifiers_cool_before_current_flows(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

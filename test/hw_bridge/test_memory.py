@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import errno
 import json
 import os
@@ -15,7 +16,7 @@ from maglev_hw_bridge.drivers import DriverError
 from maglev_hw_bridge.memory import Memory, memory_file
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.stage import BridgeStage, Mode
-from maglev_model.parameters import build
+from maglev_model.parameters import ParameterError, build
 from maglev_model.stage import Fault, StageError
 
 
@@ -98,7 +99,8 @@ def test_what_is_killed_in_flight_is_a_fault_and_hot(tmp_path: Path) -> None:
     'content',
     ['', '{', '[]', '{"active": false}', '{"active": false, "load": [1], "time": 0, "fault": null}',
      '{"active": false, "load": "hot", "time": 0, "fault": 3}', b'\xff\xfe',
-     '{"active": false, "load": [NaN,0,0,0,0,0,0,0,0,0,0,0], "time": 0, "fault": null}'],
+     '{"active": false, "load": [NaN,0,0,0,0,0,0,0,0,0,0,0], "time": 0, "fault": null}',
+     '{"active": false, "load": [0,0,0,0,0,0,0,0,0,0,0,0], "time": NaN, "fault": null}'],
 )  # fmt: skip
 def test_a_damaged_file_is_a_fault_and_hot(tmp_path: Path, content: str | bytes) -> None:
     path = tmp_path / 'boards.json'
@@ -201,6 +203,53 @@ def test_the_proof_is_recorded_and_holds_for_what_was_proven(tmp_path: Path, of:
     assert content[of] == getattr(parameters.boards, of)
     recorded.write_text(json.dumps({**content, of: 'another'}))
     assert not memory.proven(parameters)
+
+
+def test_what_was_proven_with_another_driver_is_not(tmp_path: Path) -> None:
+    rehearsed = with_lines(tmp_path / 'boards.json')
+    memory = Memory(rehearsed)
+    memory.record_proof(rehearsed)
+    assert not memory.proven(dataclasses.replace(rehearsed, driver='quanser'))
+
+
+def test_a_proof_is_forgotten_once_it_is_tried_anew(tmp_path: Path) -> None:
+    parameters = with_lines(tmp_path / 'boards.json')
+    memory = Memory(parameters)
+    memory.forget_proof()
+    memory.record_proof(parameters)
+    memory.forget_proof()
+    assert not memory.proven(parameters)
+
+
+def test_what_is_kept_outlasts_a_loss_of_power(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The file before it gets its name, the folder afterwards."""
+    path, order = tmp_path / 'boards.json', []
+    fsync = os.fsync
+
+    def noted(descriptor: int) -> None:
+        order.append((Path(os.readlink(f'/proc/self/fd/{descriptor}')), path.exists()))
+        fsync(descriptor)
+
+    monkeypatch.setattr(os, 'fsync', noted)
+    kept_in(path).keep(np.zeros(12), None, active=True)
+    assert order == [(tmp_path / 'boards.json.new', False), (tmp_path, True)]
+
+
+@pytest.mark.parametrize('named', ['~nobody-of-this-name/boards.json', ''])
+def test_a_home_that_nobody_knows_is_said(named: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    given = {'driver': 'quanser', 'boards.memory': named}
+
+    def unknown() -> Path:
+        raise RuntimeError('Could not determine home directory.')
+
+    monkeypatch.delenv('XDG_STATE_HOME', raising=False)
+    monkeypatch.setattr(Path, 'home', unknown)
+    with pytest.raises(
+        ParameterError, match=r"'boards\.memory' is '.*home directory\. Name a file"
+    ):
+        memory_file(build(BridgeParameters, given))
 
 
 def test_a_proof_that_cannot_be_recorded_is_said(tmp_path: Path) -> None:

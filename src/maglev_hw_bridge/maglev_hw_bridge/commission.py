@@ -148,6 +148,7 @@ class Commissioning:
             'prove the last line with dummy loads, 0.5 A in one of each board: stop input, '
             'enable line, watchdog, emergency stop'
         )
+        self._memory.forget_proof()
         with self._current():
             Proof(
                 self._parameters, self._driver, self._amplifiers, self._operator, self._tell

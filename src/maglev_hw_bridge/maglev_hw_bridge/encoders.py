@@ -76,7 +76,9 @@ class Encoders:
     def beyond_stops(self) -> str:
         """Which encoder reads what the stops do not let the platen be; empty: none."""
         length = self.arrays.length
-        wrong = np.flatnonzero((length < self._lower - BEYOND_STOPS) | (length > self._upper + BEYOND_STOPS))
+        wrong = np.flatnonzero(
+            (length < self._lower - BEYOND_STOPS) | (length > self._upper + BEYOND_STOPS)
+        )
         if not len(wrong):
             return ''
         name, value = ENCODER_NAMES[wrong[0]], length[wrong[0]]

@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import json
+import math
 import os
 import time
 from collections.abc import Callable
@@ -22,6 +23,7 @@ import numpy as np
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.signal_parameters import PHASES
 from maglev_model.axes import FloatArray
+from maglev_model.parameters import ParameterError
 from maglev_model.stage import Fault, StageError
 
 _FULL = 1.0  # I²t load of a phase that nobody knows anything about
@@ -36,13 +38,21 @@ class Kept(NamedTuple):
 
 
 def memory_file(parameters: BridgeParameters) -> Path | None:
-    """Where it is kept; None: nowhere, as by default with emulated boards."""
+    """Where it is kept; None: nowhere, as by default with emulated boards.
+
+    Raises ParameterError when that is below a home that nobody knows.
+    """
     boards = parameters.boards
-    if boards.memory:
-        return Path(boards.memory).expanduser()
-    if parameters.driver == 'emulated':
-        return None
-    state = Path(os.environ.get('XDG_STATE_HOME') or Path.home() / '.local' / 'state')
+    try:
+        if boards.memory:
+            return Path(boards.memory).expanduser()
+        if parameters.driver == 'emulated':
+            return None
+        state = Path(os.environ.get('XDG_STATE_HOME') or Path.home() / '.local' / 'state')
+    except RuntimeError as error:  # whose home is not known
+        raise ParameterError(
+            f"parameter 'boards.memory' is '{boards.memory}': {error} Name a file by its whole path"
+        ) from error
     name = '-'.join([boards.type, *boards.identifier]).replace(os.sep, '_')
     return state / 'maglev-stage' / f'{name}.json'
 
@@ -106,7 +116,10 @@ class Memory:
         load = np.array(content['load'], dtype=np.float64)
         if load.shape != (PHASES,) or not np.all((load >= 0.0) & np.isfinite(load)):
             raise ValueError
-        passed = max(self._clock() - float(content['time']), 0.0)  # a clock set back cools nothing
+        kept_at = float(content['time'])
+        if not math.isfinite(kept_at):
+            raise ValueError
+        passed = max(self._clock() - kept_at, 0.0)  # a clock set back cools nothing
         given = content['fault']
         fault = None
         if given is not None:
@@ -131,10 +144,22 @@ class Memory:
                 file.flush()
                 os.fsync(file.fileno())
             new.replace(self._path)
+            _outlast_power(self._path.parent)
         except OSError as error:
             with contextlib.suppress(OSError):
                 new.unlink()
             raise self._unusable(error) from error
+
+    def forget_proof(self) -> None:
+        """The last line is being proven anew: what was proven before does not hold any more.
+
+        Raises StageError.
+        """
+        if self._path is not None:
+            try:
+                self._proof_file.unlink(missing_ok=True)
+            except OSError as error:
+                raise self._unusable(error) from error
 
     def record_proof(self, parameters: BridgeParameters) -> None:
         """Keep that the last line was proven with these parameters. Raises StageError."""
@@ -164,8 +189,19 @@ class Memory:
         )
 
 
+def _outlast_power(folder: Path) -> None:
+    """What was renamed in there keeps its new name, where the file system can promise that."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        with contextlib.suppress(OSError):
+            os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
 def _last_line(parameters: BridgeParameters) -> dict[str, Any]:
     """What the proof of the last line holds for."""
     names = ['type', 'watchdog', 'stop_input', 'stop_level', 'enable_output', 'enable_level']
     names += ['open_level', 'digital_expiry', 'analog_expiry']
-    return {name: getattr(parameters.boards, name) for name in names}
+    lines = {name: getattr(parameters.boards, name) for name in names}
+    return {'driver': parameters.driver, **lines}
