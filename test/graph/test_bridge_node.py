@@ -275,6 +275,7 @@ def landed_softly(observer: Observer) -> bool:
         pytest.param((signal.SIGINT, signal.SIGINT), marks=pytest.mark.long),
         (signal.SIGINT, signal.SIGTERM),
         (signal.SIGTSTP,),
+        (signal.SIGQUIT,),
     ],
 )
 def test_stopped_in_flight_it_lands_first(

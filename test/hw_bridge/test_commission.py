@@ -114,7 +114,7 @@ def test_the_first_lift_off_of_real_boards_is_on_time(
     assert not order
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTSTP])
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTSTP, signal.SIGQUIT])
 def test_no_signal_ends_the_lift_off_in_the_air(number: signal.Signals) -> None:
     seen: list[EmulatedBoards] = []
 
@@ -138,7 +138,7 @@ def test_no_signal_ends_the_lift_off_in_the_air(number: signal.Signals) -> None:
 
 
 @pytest.mark.parametrize('step', ['prove', 'motor 1'])
-@pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGHUP, signal.SIGTSTP])
+@pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGHUP, signal.SIGTSTP, signal.SIGQUIT])
 def test_a_signal_ends_it_where_current_flows(number: signal.Signals, step: str) -> None:
     told: list[str] = []
 

@@ -28,6 +28,7 @@ _ATTEMPTS = 3  # at what makes a board safe
 _SIGNALS = (
     signal.SIGHUP,
     signal.SIGINT,
+    signal.SIGQUIT,
     signal.SIGTERM,
     signal.SIGTSTP,
     signal.SIGALRM,
@@ -38,7 +39,7 @@ _SIGNALS = (
 )
 
 
-_ENDING = (signal.SIGHUP, signal.SIGINT, signal.SIGTERM, signal.SIGTSTP)
+ENDING = (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTERM, signal.SIGTSTP)
 
 # Python's own pthread_sigmask makes a set of enums of each mask: 8 µs more, twice a sample
 _LIBC = ctypes.PyDLL(None)
@@ -74,7 +75,7 @@ def unbroken() -> Iterator[None]:
     def catch(number: int, _frame: object) -> None:
         caught.append(number)
 
-    before = {number: signal.signal(number, catch) for number in _ENDING}
+    before = {number: signal.signal(number, catch) for number in ENDING}
     try:
         yield
     finally:

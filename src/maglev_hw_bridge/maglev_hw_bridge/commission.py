@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, NoReturn
 import numpy as np
 
 from maglev_hw_bridge.amplifiers import Amplifiers
-from maglev_hw_bridge.board import unbroken
+from maglev_hw_bridge.board import ENDING, unbroken
 from maglev_hw_bridge.diagnosis import diagnose
 from maglev_hw_bridge.doubts import doubts
 from maglev_hw_bridge.drivers import Driver, DriverError, make_driver
@@ -281,17 +281,16 @@ def _operator(driver: Driver, yes: bool) -> Operator:
 
 @contextlib.contextmanager
 def _ended_by_signals() -> Iterator[None]:
-    """SIGTERM, SIGHUP and SIGTSTP (Ctrl-Z) end it in order, as SIGINT does: none leaves current."""
+    """What may end or stop it does so in order, as SIGINT does: none leaves current."""
 
     def end(_number: int, _frame: object) -> None:
         raise KeyboardInterrupt
 
-    numbers = (signal.SIGTERM, signal.SIGHUP, signal.SIGTSTP)
-    before = [signal.signal(number, end) for number in numbers]
+    before = {number: signal.signal(number, end) for number in ENDING}
     try:
         yield
     finally:
-        for number, handler in zip(numbers, before, strict=True):
+        for number, handler in before.items():
             signal.signal(number, handler)
 
 

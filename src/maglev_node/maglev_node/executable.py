@@ -18,7 +18,8 @@ def run_nodes(
     graph already. With ``--help`` or ``-h`` it only says what they are. Nodes in the background
     yield to those of the loop when they want the same core. Several are for what only watches:
     those of the loop take their real-time priority, and land, each in a process of its own.
-    What must not stand still is one that never ``suspends``: Ctrl-Z ends it, as Ctrl-C does.
+    What must not stand still is one that never ``suspends``: Ctrl-Z and Ctrl-\\ end it, as Ctrl-C
+    does.
     A signal while the rest is imported, for a third of a second, ends the nodes in order as soon as
     they are there.
     """

@@ -10,7 +10,8 @@ _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGXCPU)
 def listen(suspends: bool = True) -> list[int]:
     """Where the numbers of signals are noted from now on; SIGHUP may be ignored, as by nohup.
 
-    ``suspends``: Ctrl-Z, SIGTSTP, stops the process as it does any other, or else is one of them.
+    ``suspends``: Ctrl-Z and Ctrl-\\, SIGTSTP and SIGQUIT, do what they do to any other process, or
+    else are among them.
     """
     caught: list[int] = []
 
@@ -18,7 +19,7 @@ def listen(suspends: bool = True) -> list[int]:
         if number != signal.SIGXCPU or number not in caught:  # which comes every second
             caught.append(number)
 
-    for number in _ENDING if suspends else (*_ENDING, signal.SIGTSTP):
+    for number in _ENDING if suspends else (*_ENDING, signal.SIGTSTP, signal.SIGQUIT):
         if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, catch)
     return caught
