@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -278,6 +279,37 @@ def test_without_the_vendors_module_it_says_how_to_get_it() -> None:
         make_driver(build(BridgeParameters, {'driver': 'quanser'}), realtime=False)
     with pytest.raises(ParameterError, match='one of emulated, quanser'):
         make_driver(build(BridgeParameters, {'driver': 'qanser'}), realtime=True)
+
+
+def module_in(folder: Path, name: str, text: str) -> None:
+    """A module ``package.name`` that can be imported once the folder is on the path."""
+    path = folder / f'{name.replace(".", "/")}.py'
+    path.parent.mkdir()
+    path.write_text(text)
+
+
+def test_without_the_library_that_the_vendors_module_loads_it_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module_in(tmp_path, 'quanser.hardware', 'raise OSError("cannot load library \'hil\'")')
+    monkeypatch.syspath_prepend(str(tmp_path))
+    with pytest.raises(DriverError, match=r"cannot load library 'hil'; it and .*quanser\.com"):
+        make_driver(build(BridgeParameters, {'driver': 'quanser'}), realtime=True)
+    del sys.modules['quanser']
+
+
+def test_a_driver_that_lacks_a_call_is_refused_before_it_is_needed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    has = ('late', 'stop_pressed', 'open', 'counts', 'start', 'read', 'write', 'stop', 'close')
+    text = 'from types import SimpleNamespace\n\n\ndef make(parameters, realtime):\n'
+    text += f'    return SimpleNamespace(**dict.fromkeys({has!r}))\n'
+    module_in(tmp_path, 'half_a.driver', text)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    with pytest.raises(
+        ParameterError, match=r"'half_a\.driver', a driver without disable, enable$"
+    ):
+        make_driver(build(BridgeParameters, {'driver': 'half_a.driver'}), realtime=True)
 
 
 def test_nothing_else_imports_the_vendors_module() -> None:

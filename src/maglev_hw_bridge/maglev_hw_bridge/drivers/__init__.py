@@ -13,10 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_model.parameters import ParameterError
 from maglev_model.plugins import find_plugin
 
 CountArray = NDArray[np.int32]
 VoltArray = NDArray[np.float64]
+
+
+_NEEDED = ('late', 'stop_pressed', 'open', 'counts', 'start', 'read', 'write', 'disable', 'enable')
+_NEEDED += ('stop', 'close')
 
 
 class DriverError(RuntimeError):
@@ -107,7 +112,16 @@ class Truthful(Protocol):
 
 
 def make_driver(parameters: BridgeParameters, realtime: bool) -> Driver:
-    """The driver that ``driver`` names. Raises ParameterError when there is none of that name."""
+    """The driver that ``driver`` names.
+
+    Raises ParameterError when there is none of that name, or what a driver needs is missing from
+    it: that is not to be found out by a landing.
+    """
     module = find_plugin('driver', parameters.driver, ('make',), __name__)
     driver: Driver = module.make(parameters, realtime)
+    missing = [name for name in _NEEDED if not hasattr(driver, name)]
+    if missing:
+        raise ParameterError(
+            f"parameter 'driver' is '{parameters.driver}', a driver without {', '.join(missing)}"
+        )
     return driver

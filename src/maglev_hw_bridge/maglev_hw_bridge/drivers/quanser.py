@@ -30,9 +30,9 @@ _QUARTERS = 5
 """How long a board that is not safe is held on to, in quarters of the watchdog's time."""
 
 _NO_MODULE = (
-    "the vendor's Python module 'quanser.hardware' is not installed: it comes with the Quanser SDK"
-    ' or QUARC from quanser.com (its folder python/, installed with pip), not from PyPI;'
-    ' without boards use driver: emulated'
+    "the vendor's Python module 'quanser.hardware' cannot be imported: {}; it and the library that "
+    'it loads come with the Quanser SDK or QUARC from quanser.com (its folder python/, installed '
+    'with pip), not from PyPI; without boards use driver: emulated'
 )
 
 
@@ -44,8 +44,8 @@ def make(parameters: BridgeParameters, realtime: bool) -> QuanserDriver:
         )
     try:
         hardware = importlib.import_module('quanser.hardware')
-    except ImportError as error:
-        raise DriverError(_NO_MODULE) from error
+    except (ImportError, OSError) as error:  # it loads the vendor's library at once
+        raise DriverError(_NO_MODULE.format(error)) from error
     return QuanserDriver(parameters, hardware)
 
 
