@@ -318,3 +318,24 @@ def test_a_callback_that_raises_lands_it(nodes: Nodes, observer: Observer) -> No
     assert 'a defect' in graph['stage'].output
     observer.wait(lambda: height(observer) > LOWER_STOP - 1e-5)
     assert landed_softly(observer)
+
+
+def test_asked_to_land_it_says_what_it_does(nodes: Nodes, observer: Observer) -> None:
+    lost_at = ('emulation.inject.expired_watchdog:=true', 'emulation.inject.sample:=20')
+    nodes.start('hw_bridge', *lost_at, params=FILES['hw_bridge'])
+    observer.watch(MEASUREMENT)
+    observer.wait(lambda: bool(numbers(observer)))
+    resting = 'no current, amplifiers disabled; ~/reset follows the controller again'
+    for _ in range(2):
+        landed = observer.call('/hw_bridge/land')
+        assert (landed.success, landed.message) == (True, resting)
+    publish = answer(observer)
+
+    def lost() -> bool:
+        publish(max(numbers(observer)))
+        return 'watchdog' in observer.call('/hw_bridge/land').message
+
+    observer.wait(lost)
+    refused = observer.call('/hw_bridge/land')
+    assert not refused.success
+    assert refused.message.startswith("no current flows: the boards' watchdog expired")

@@ -102,8 +102,11 @@ class BridgeNode(StageNode[BridgeNodeParameters, BridgeStage]):
 
     def _land(self) -> tuple[bool, str]:
         self.require_active()
+        if self.stage.mode is Mode.LOST:
+            raise NodeError(f'no current flows: {self.stage.fault}')
         self.stage.land('asked to')
-        return True, 'landing; ~/reset follows the controller again'
+        now = 'landing' if self.stage.mode is Mode.LANDING else self.stage.mode.value
+        return True, f'{now}; ~/reset follows the controller again'
 
     def _watch_load(self) -> None:
         """Say the first warning of the I²t budget, once."""

@@ -20,8 +20,10 @@ CountArray = NDArray[np.int32]
 VoltArray = NDArray[np.float64]
 
 
-_NEEDED = ('late', 'stop_pressed', 'open', 'counts', 'start', 'read', 'write', 'disable', 'enable')
-_NEEDED += ('stop', 'close')
+_NEEDED = (
+    *('late', 'stop_pressed'),
+    *('open', 'counts', 'start', 'read', 'write', 'disable', 'enable', 'stop', 'close'),
+)
 
 
 class DriverError(RuntimeError):
