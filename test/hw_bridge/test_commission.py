@@ -291,6 +291,11 @@ def test_an_encoder_that_counts_the_other_way(encoder: int) -> None:
         commission({'encoder.direction': direction})
 
 
+def test_a_count_that_is_worth_more_is_told_though_the_lift_off_looks_right() -> None:
+    with pytest.raises(WrongError, match=r'element 0 of encoder\.resolution'):
+        commission({'encoder.resolution': [5e-6] * 4 + [1e-5] * 2})
+
+
 @pytest.mark.parametrize(
     'pair', [(1, 2), *(pytest.param(pair, marks=pytest.mark.long) for pair in ((1, 8), (4, 10)))]
 )

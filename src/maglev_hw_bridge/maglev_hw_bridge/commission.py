@@ -27,10 +27,11 @@ from maglev_hw_bridge.drivers.emulated import EmulatedDriver
 from maglev_hw_bridge.encoders import Encoders, HomingError
 from maglev_hw_bridge.lift import Lift
 from maglev_hw_bridge.memory import Memory
-from maglev_hw_bridge.operators import EmulatedPerson, Operator, Person, StoppedError
+from maglev_hw_bridge.operators import Act, EmulatedPerson, Operator, Person, StoppedError
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.proof import Proof, WrongError
 from maglev_hw_bridge.response import Pulses, Twins
+from maglev_hw_bridge.scales import prove_scales
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES, PHASE_NAMES, PHASES
 from maglev_hw_bridge.stage import BridgeStage
 from maglev_model.arguments import number
@@ -90,6 +91,7 @@ class Commissioning:
             self._keep(active=True)
             self._last_line()
             self._homing()
+            self._scales()
             self._phases()
         finally:
             with unbroken():
@@ -172,14 +174,20 @@ class Commissioning:
             raise WrongError(str(error)) from error
         self._tell('  at rest; zeros taken')
 
+    def _scales(self) -> None:
+        self._ask('move the platen by hand, to see what a count of each encoder is worth')
+        prove_scales(self._parameters, self._operator, self._lengths)
+        self._tell('  every encoder sees what it is moved by')
+
+    def _lengths(self) -> FloatArray:
+        """What the encoders read now (6,) [m]."""
+        self._driver.counts(self._counts)
+        return np.array(self._encoders.decode(self._counts))
+
     def _phases(self) -> None:
         machine = self._parameters.machine
-        self._ask(
-            'put the platen near the middle, still on its stop, where it can move 20 mm along X '
-            'and Z'
-        )
-        self._driver.counts(self._counts)
-        place = self._encoders.decode(self._counts)[4:]
+        self._operator.act(Act.MIDDLE)
+        place = self._lengths()[4:]
         if np.max(np.abs(place)) > 0.5 * min(machine.x_max, machine.z_max):
             raise WrongError(
                 f'the encoders have the platen at x = {place[0] * 1e3:.1f} mm, z = '

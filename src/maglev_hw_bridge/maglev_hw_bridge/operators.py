@@ -14,6 +14,9 @@ import numpy as np
 from maglev_hw_bridge.drivers.emulated import EmulatedBoards
 from maglev_hw_bridge.signal_parameters import PHASE_NAMES
 
+SHIM = 1e-3
+"""By how much shims raise the platen, not so far that it is lifted by its magnets [m]."""
+
 _A_CURRENT = 0.1  # that shows at a load [A]
 Meanwhile = Callable[[], None]
 
@@ -30,6 +33,17 @@ class Act(enum.Enum):
     RELEASE = 'release the emergency stop'
     UNPLUG = "pull the plug of the emergency stop's wire, as if it were broken"
     PLUG = 'put the plug back'
+    SHIMS = (
+        f'raise the platen by {SHIM * 1e3:g} mm, by a shim of that on each seat of its lower stop'
+    )
+    NO_SHIMS = 'take the shims away, so that it rests on its lower stop again'
+    X_END = 'push it along X, still on its stop, to one end of its guide'
+    X_OTHER_END = 'push it to the other end along X'
+    Z_END = 'push it along Z, still on its stop, to one end of its guide'
+    Z_OTHER_END = 'push it to the other end along Z'
+    MIDDLE = (
+        'put the platen near the middle, still on its stop, where it can move 20 mm along X and Z'
+    )
 
 
 class Operator(Protocol):
@@ -136,8 +150,24 @@ class EmulatedPerson:
             boards.dummy_loads = what is Act.LOADS
         elif what in (Act.PRESS, Act.RELEASE):
             boards.stop_pressed = what is Act.PRESS
-        else:
+        elif what in (Act.UNPLUG, Act.PLUG):
             boards.lines.stop_plugged = what is Act.PLUG
+        else:
+            self._move(what)
+
+    def _move(self, what: Act) -> None:
+        """Move the platen by hand."""
+        machine, position = self._boards.parameters.machine, self._boards.rig.state[::2]
+        position[:3] = {
+            Act.SHIMS: (machine.gap_max - SHIM, *position[1:3]),
+            Act.NO_SHIMS: (machine.gap_max, *position[1:3]),
+            Act.X_END: (position[0], -machine.x_max, position[2]),
+            Act.X_OTHER_END: (position[0], machine.x_max, position[2]),
+            Act.Z_END: (*position[:2], -machine.z_max),
+            Act.Z_OTHER_END: (*position[:2], machine.z_max),
+            Act.MIDDLE: (position[0], 0.0, 0.0),
+        }[what]
+        self._boards.place(position)
 
     def act_soon(self, what: Act) -> None:
         """See the protocol."""
