@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import os
 import re
+import select
 from collections.abc import Callable
 
 import numpy as np
@@ -182,3 +183,19 @@ def test_current_flows_on_until_somebody_answers_clearly(
         monkeypatch.setattr('sys.stdin', stdin)
         assert Person().sees_current(3, lambda: print(typed.pop(0), end='', file=keys)) == seen
     assert not typed
+
+
+def test_what_was_typed_before_it_is_asked_answers_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    keyboard, terminal = os.openpty()
+    os.write(keyboard, b'y\n')
+    with open(terminal) as stdin, open(keyboard, 'wb', buffering=0) as keys:
+        select.select([stdin], [], [])
+        monkeypatch.setattr('sys.stdin', stdin)
+        assert not Person().sees_current(3, lambda: keys.write(b'n\n'))
+
+
+def test_where_nobody_can_answer_nothing_is_agreed_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('sys.stdin', None)
+    for asked in (Person().go_on, Person().sees_current):
+        with pytest.raises(EOFError):
+            asked(0)  # type: ignore[operator]

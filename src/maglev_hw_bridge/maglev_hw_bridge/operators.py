@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 import select
 import sys
+import termios
 import time
 from collections.abc import Callable
 from typing import Protocol
@@ -95,7 +96,7 @@ class Person:
 
     def act(self, what: Act) -> None:
         """See the protocol."""
-        input(f'  {what.value}, then press Enter: ')
+        _answer(f'  {what.value}, then press Enter: ')
 
     def act_soon(self, what: Act) -> None:
         """See the protocol."""
@@ -120,15 +121,26 @@ def _seen(question: str, meanwhile: Meanwhile | None = None) -> bool:
     """The answer; only a clear no is one, for that is what mostly passes."""
     answer = ''
     while answer not in ('y', 'yes', 'n', 'no'):
-        print(f'  {question} [y/n] ', end='', flush=True)
-        while meanwhile is not None and not select.select([sys.stdin], [], [], 0.0)[0]:
-            meanwhile()
-        answer = input().strip().lower()
+        answer = _answer(f'  {question} [y/n] ', meanwhile).strip().lower()
     return answer in ('y', 'yes')
 
 
 def _agreed(question: str) -> bool:
-    return input(question).strip().lower() in ('y', 'yes')
+    return _answer(question).strip().lower() in ('y', 'yes')
+
+
+def _answer(question: str, meanwhile: Meanwhile | None = None) -> str:
+    """What is typed from now on; ``meanwhile`` as for seeing a current. Raises EOFError."""
+    if sys.stdin is None:  # closed by whoever started it
+        raise EOFError
+    if sys.stdin.isatty():
+        termios.tcflush(sys.stdin, termios.TCIFLUSH)
+    if meanwhile is None:
+        return input(question)
+    print(question, end='', flush=True)
+    while not select.select([sys.stdin], [], [], 0.0)[0]:
+        meanwhile()
+    return input()
 
 
 class EmulatedPerson:
