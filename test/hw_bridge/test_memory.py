@@ -16,7 +16,7 @@ from maglev_hw_bridge.drivers import DriverError
 from maglev_hw_bridge.memory import Memory, memory_file
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.stage import BridgeStage, Mode
-from maglev_model.parameters import ParameterError, build
+from maglev_model.parameters import ParameterError, build, replace
 from maglev_model.stage import Fault, StageError
 
 
@@ -41,6 +41,16 @@ def test_emulated_boards_keep_nothing_and_real_ones_a_file(
     named = {'driver': 'quanser', 'boards.identifier': ('usb/1', 'usb/2')}
     real = memory_file(build(BridgeParameters, named))
     assert real == tmp_path / '.local' / 'state' / 'maglev-stage' / 'q8-usb_1-usb_2.json'
+    named['boards.identifier'] = ('usb/2', 'usb/1')
+    assert memory_file(build(BridgeParameters, named)) == real  # the same boards
+
+
+def test_what_is_another_file_in_every_folder_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(ParameterError, match=r"'boards\.memory' is 'it\.json'.*its whole path"):
+        memory_file(build(BridgeParameters, {'boards.memory': 'it.json'}))
+    monkeypatch.setenv('XDG_STATE_HOME', 'state')
+    with pytest.raises(ParameterError, match=r"makes 'state/maglev-stage/q8-0-1\.json'"):
+        memory_file(build(BridgeParameters, {'driver': 'quanser'}))
 
 
 def test_without_a_file_nothing_is_kept() -> None:
@@ -205,11 +215,12 @@ def test_the_proof_is_recorded_and_holds_for_what_was_proven(tmp_path: Path, of:
     assert not memory.proven(parameters)
 
 
-def test_what_was_proven_with_another_driver_is_not(tmp_path: Path) -> None:
+def test_what_was_proven_with_another_driver_or_first_board_is_not(tmp_path: Path) -> None:
     rehearsed = with_lines(tmp_path / 'boards.json')
     memory = Memory(rehearsed)
     memory.record_proof(rehearsed)
     assert not memory.proven(dataclasses.replace(rehearsed, driver='quanser'))
+    assert not memory.proven(replace(rehearsed, {'boards.identifier': ('1', '0')}))
 
 
 def test_a_proof_is_forgotten_once_it_is_tried_anew(tmp_path: Path) -> None:

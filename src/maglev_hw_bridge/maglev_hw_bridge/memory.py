@@ -40,21 +40,29 @@ class Kept(NamedTuple):
 def memory_file(parameters: BridgeParameters) -> Path | None:
     """Where it is kept; None: nowhere, as by default with emulated boards.
 
-    Raises ParameterError when that is below a home that nobody knows.
+    The same boards have the same one, in whichever order. Raises ParameterError when that is below
+    a home that nobody knows, or depends on where the process was started.
     """
     boards = parameters.boards
+    if parameters.driver == 'emulated' and not boards.memory:
+        return None
     try:
         if boards.memory:
-            return Path(boards.memory).expanduser()
-        if parameters.driver == 'emulated':
-            return None
-        state = Path(os.environ.get('XDG_STATE_HOME') or Path.home() / '.local' / 'state')
+            path = Path(boards.memory).expanduser()
+        else:
+            state = Path(os.environ.get('XDG_STATE_HOME') or Path.home() / '.local' / 'state')
+            name = '-'.join([boards.type, *sorted(boards.identifier)]).replace(os.sep, '_')
+            path = state / 'maglev-stage' / f'{name}.json'
     except RuntimeError as error:  # whose home is not known
         raise ParameterError(
             f"parameter 'boards.memory' is '{boards.memory}': {error} Name a file by its whole path"
         ) from error
-    name = '-'.join([boards.type, *boards.identifier]).replace(os.sep, '_')
-    return state / 'maglev-stage' / f'{name}.json'
+    if not path.is_absolute():
+        raise ParameterError(
+            f"parameter 'boards.memory' is '{boards.memory}', which makes '{path}', another file "
+            'in every folder that a bridge is started in: name it by its whole path'
+        )
+    return path
 
 
 class Memory:
@@ -204,4 +212,5 @@ def _last_line(parameters: BridgeParameters) -> dict[str, Any]:
     names = ['type', 'watchdog', 'stop_input', 'stop_level', 'enable_output', 'enable_level']
     names += ['open_level', 'digital_expiry', 'analog_expiry']
     lines = {name: getattr(parameters.boards, name) for name in names}
-    return {'driver': parameters.driver, **lines}
+    which = list(parameters.boards.identifier)  # the first has the lines
+    return {'driver': parameters.driver, 'identifier': which, **lines}

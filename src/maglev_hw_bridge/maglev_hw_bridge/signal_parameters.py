@@ -287,9 +287,9 @@ class BoardParameters:
     )
     memory: str = parameter(
         '',
-        "file that keeps the amplifiers' I2t load and a latched fault while no bridge runs, and "
-        'that keeps a second one from the boards; empty: one by boards.type and identifier in '
-        '$XDG_STATE_HOME/maglev-stage (~/.local/state), none with emulated boards',
+        "file, by its whole path, that keeps the amplifiers' I2t load and a latched fault while no "
+        'bridge runs, and that keeps a second one from the boards; empty: one by boards.type and '
+        'identifier in $XDG_STATE_HOME/maglev-stage (~/.local/state), none with emulated boards',
     )
 
     def __post_init__(self) -> None:
