@@ -161,6 +161,7 @@ def test_unhomed_it_is_not_activated(nodes: Nodes, observer: Observer) -> None:
     process = nodes.start('hw_bridge', 'autostart:=false', 'homing.x:=0.0', 'homing.z:=0.0')
     life = Life(observer, 'hw_bridge')
     assert not observer.call('/hw_bridge/home').success
+    assert 'service call /hw_bridge/home' in process.output  # it says what it waits for
     assert life.change(Transition.TRANSITION_CONFIGURE)
     assert not life.change(Transition.TRANSITION_ACTIVATE)
     assert 'home first' in process.output
