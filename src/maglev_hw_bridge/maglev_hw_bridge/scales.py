@@ -1,7 +1,7 @@
 """What a count is worth, shown by hand: shims under the platen, and its guides from end to end.
 
 What the encoders see of a phase's current shows wiring, not scale, and a lift-off is measured by
-the same encoders: twice as high as it should be it looks right, and ends at the upper stop.
+the same encoders: twice as high as it should be it looks right.
 """
 
 from __future__ import annotations
