@@ -133,3 +133,20 @@ def test_the_expiry_of_the_outputs_where_a_card_can_do_better() -> None:
 def test_one_board_is_not_two() -> None:
     with pytest.raises(ParameterError, match=r"boards\.identifier' names board '7' twice"):
         build(BridgeParameters, {'boards.identifier': ['7', '7']})
+
+
+@pytest.mark.parametrize(
+    ('given', 'name'),
+    [
+        ({'machine.gap_min': 0.0185}, 'fault.lower[0]'),
+        ({'machine.x_max': 0.048}, 'fault.lower[1] fault.upper[1]'),
+        ({'machine.theta_max': 0.012}, 'fault.lower[4] fault.upper[4]'),
+        ({'machine.gap_max': 0.0312}, ''),
+    ],
+)
+def test_a_range_of_flight_that_a_stop_ends_first_is_said(
+    given: dict[str, float], name: str
+) -> None:
+    wired = {'driver': 'quanser', 'boards.stop_input': 3, 'boards.enable_output': 5}
+    said = doubts(build(BridgeParameters, {**wired, **given}))
+    assert ' '.join(text.split("'")[1] for text in said) == name

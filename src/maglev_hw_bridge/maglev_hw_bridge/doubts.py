@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.signal_parameters import PHASE_NAMES
+from maglev_model.axes import AXES
 
 _LEFT_CURRENT = 0.02
 """Share of the continuous current that is worth a word when the watchdog leaves it flowing."""
@@ -27,7 +28,7 @@ def doubts(parameters: BridgeParameters) -> list[str]:
             "parameter 'boards.enable_output' is -1: nothing but 0 V at their inputs keeps the "
             'amplifiers from carrying current'
         )
-    return said + _left_flowing(parameters)
+    return said + _left_flowing(parameters) + _beyond_the_stops(parameters)
 
 
 def _left_flowing(parameters: BridgeParameters) -> list[str]:
@@ -43,3 +44,22 @@ def _left_flowing(parameters: BridgeParameters) -> list[str]:
         f' puts out 0 V, {PHASE_NAMES[worst]} carries {left[worst]:.2f} A unless the enable line '
         "stops it; null the amplifier's offset"
     ]
+
+
+def _beyond_the_stops(parameters: BridgeParameters) -> list[str]:
+    """Of y only the upper stop: on the lower one it rests."""
+    fault, machine = parameters.fault, parameters.machine
+    said = []
+    for axis, name in enumerate(AXES):
+        for side, limit, stop in (
+            ('lower', fault.lower[axis], machine.lower_limit[axis]),
+            ('upper', fault.upper[axis], machine.upper_limit[axis]),
+        ):
+            within = limit > stop if side == 'lower' else limit < stop
+            if within or (name, side) == ('y', 'upper'):
+                continue
+            said.append(
+                f"parameter 'fault.{side}[{axis}]' is {limit:g}, not within the stop of {name} at "
+                f'{stop:g}: it is met before the platen is landed'
+            )
+    return said
