@@ -349,6 +349,11 @@ def test_two_errors_at_once_are_no_single_one(foretold: np.ndarray) -> None:
     assert not diagnose(seen, foretold).fine
 
 
+def test_where_the_wiring_may_be_right_other_parameters_are_named() -> None:
+    with pytest.raises(WrongError, match=r'either: .*all is well.*check .*commutation'):
+        commission({'commutation.offset': [0.5, 0.0, 0.0, 0.0]})
+
+
 def test_pulses_are_small(foretold: np.ndarray) -> None:
     assert np.max(np.abs(foretold[..., :4])) < 5e-4
     assert np.max(np.abs(foretold[..., 4:])) < 5e-3

@@ -16,6 +16,11 @@ _CLEAR = np.array([1.2e-4] * 4 + [4e-4] * 2)  # more says no more [m]
 _MARGIN = 0.015  # by which one explanation must beat the next, else both are named
 _WORST = 0.12  # an explanation further off explains nothing
 
+_WELL = 'all is well'
+_OTHERWISE = (
+    'where the wiring is right, check amplifier.gain, amplifier.offset, commutation.* and machine.*'
+)
+
 
 class Finding(NamedTuple):
     """What the responses mean."""
@@ -46,7 +51,8 @@ def diagnose(seen: FloatArray, foretold: FloatArray) -> Finding:
             'no single error explains this: check all wiring against amplifier.* and encoder.*',
         )
     if next_best - best < _MARGIN:
-        return Finding(False, f'either: {text or "all is well"}; or: {other or "all is well"}')
+        either = f'either: {text or _WELL}; or: {other or _WELL}'
+        return Finding(False, either if text and other else f'{either}; {_OTHERWISE}')
     return Finding(not text, text or 'every phase and every encoder is as the parameters say')
 
 
