@@ -11,6 +11,7 @@ from maglev_model.machine import machine_constants
 from maglev_model.parameters import ParameterError, build, from_yaml, read_yaml, specs, values
 from maglev_plant.arrays import true_machine
 from maglev_plant.parameters import PlantParameters
+from maglev_plant.simulation import SimulatedStage
 
 PARAMS = Path(__file__).resolve().parents[2] / 'params'
 
@@ -76,6 +77,12 @@ def test_refused(name: str, value: object, match: str) -> None:
         {'guide.coulomb_velocity': (1e-5,) * 5},
         {'effects.friction.vertical_guides': (20.0,) * 4},
         {'effects.friction.vertical_guides': (0.0, 40.0, 0.0, 40.0)},
+        {'effects.friction.vertical_guides': (2.0,) * 4, 'offset.mass_y': 0.2},
+        {'guide.coulomb': (0.0, 2.9, 0.0, 0.0, 0.0), 'effects.friction.static_ratio': 2.0},
+        {
+            'guide.coulomb': (0.0, 2.9, 0.0, 0.0, 0.0),
+            'effects.friction.tilt_load': (0.0, 70.0, 0.0, 0.0, 0.0),
+        },
     ],
 )
 def test_the_substeps_asked_for_are_enough(stiff: dict[str, object]) -> None:
@@ -85,6 +92,24 @@ def test_the_substeps_asked_for_are_enough(stiff: dict[str, object]) -> None:
     assert build(PlantParameters, {**stiff, 'substeps': needed}).substeps == needed
     other = {'effects.friction.model': 'lugre'}
     assert build(PlantParameters, {**stiff, **other}).effects.friction.model == 'lugre'
+
+
+def test_with_the_substeps_asked_for_smooth_friction_brings_to_rest_what_slides() -> None:
+    sliding = {
+        'guide.coulomb': (0.0, 2.9, 0.0, 0.0, 0.0),
+        'guide.locked': (True, False, True, True, True),
+        'effects.friction.static_ratio': 3.0,
+        'initial.position': (0.025, 0.0, 0.0, 0.0, 0.0),
+        'initial.velocity': (0.0, 0.02, 0.0, 0.0, 0.0),
+    }
+    with pytest.raises(ParameterError, match=r'substeps.* x .*at least') as refusal:
+        build(PlantParameters, sliding)
+    needed = int(str(refusal.value).rsplit(' ', 1)[1])
+    stage = SimulatedStage(build(PlantParameters, {**sliding, 'substeps': needed}))
+    for _ in range(200):
+        stage.read()
+    assert stage.state[2] > 0.0
+    assert abs(stage.state[3]) < 1e-12
 
 
 def test_offsets_change_the_true_plant_only() -> None:

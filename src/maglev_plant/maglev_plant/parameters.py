@@ -14,7 +14,7 @@ from maglev_plant.effects.parameters import EffectParameters
 
 _BY_AXIS = ', by axis y, x, z, phi, theta'
 
-_LONGEST_STEP = 1.5
+_LONGEST_STEP = 2.0
 """Longest integration step in time constants of the friction; stable up to 2.78."""
 
 
@@ -224,24 +224,31 @@ class PlantParameters:
                 f'and its seats reach {reach:g} m further'
             )
 
+    def _breaking(self, axis: int) -> float:
+        """How much greater than Coulomb friction it is where an axis rests, tilted to the stops."""
+        friction, tilt = self.effects.friction, math.hypot(*self.machine.upper_limit[PHI:])
+        return friction.static_ratio * (1.0 + friction.tilt_load[axis] * tilt)
+
     def _guides_rates(self) -> list[tuple[int, float]]:
         """How fast the guides at the motors brake y, phi and theta, beginning to slide [1/s]."""
-        forces, machine = self.effects.friction.vertical_guides, self.machine
-        slope = 1.0 / self.guide.coulomb_velocity[Y]
-        tilt = slope * machine.radius**2 / machine.inertia
+        forces, machine, offset = self.effects.friction.vertical_guides, self.machine, self.offset
+        slope = self._breaking(Y) / self.guide.coulomb_velocity[Y]
+        tilt = slope * machine.radius**2 / (machine.inertia * offset.inertia)
         return [
-            (Y, slope * sum(forces) / machine.mass_y),
+            (Y, slope * sum(forces) / (machine.mass_y * offset.mass_y)),
             (PHI, tilt * (forces[0] + forces[2])),
             (THETA, tilt * (forces[1] + forces[3])),
         ]
 
     def _check_substeps(self) -> None:
         guide = self.guide
-        smooth = self.effects.friction.model == 'tanh'
-        friction = zip(guide.coulomb, guide.coulomb_velocity, guide.viscous, strict=True)
-        rates = [smooth * coulomb / velocity + viscous for coulomb, velocity, viscous in friction]
-        for axis, rate in self._guides_rates():
-            rates[axis] += smooth * rate
+        rates = list(guide.viscous)
+        if self.effects.friction.model == 'tanh':
+            friction = zip(guide.coulomb, guide.coulomb_velocity, strict=True)
+            for axis, (coulomb, velocity) in enumerate(friction):
+                rates[axis] += self._breaking(axis) * coulomb / velocity
+            for axis, rate in self._guides_rates():
+                rates[axis] += rate
         needed = math.ceil(max(rates) * self.sample_time / _LONGEST_STEP)
         if self.substeps < needed:
             raise ParameterError(

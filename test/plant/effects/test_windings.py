@@ -10,8 +10,9 @@ from rough import ZERO, M, ideal_stage, magnetic_energy
 from scipy.integrate import quad
 
 from maglev_model.motor import force_coefficients
-from maglev_model.parameters import ParameterError
-from maglev_plant.effects.winding import inductance
+from maglev_model.parameters import ParameterError, build
+from maglev_plant.effects.winding import inductance, widest_gap
+from maglev_plant.parameters import PlantParameters
 
 STILL = (True,) * 5
 WINDING = {'effects__winding__voltage': 28.0, 'effects__winding__resistance': 4.0}
@@ -39,6 +40,13 @@ def test_it_changes_by_93_or_47_millihenry_between_20_and_30_mm() -> None:
 def test_an_inductance_that_k_v3_would_make_negative_is_refused() -> None:
     with pytest.raises(ParameterError, match=r'effects.winding.inductance.*widest gap'):
         ideal_stage(**WINDING, effects__winding__inductance=0.01)
+    with pytest.raises(ParameterError, match=r'effects.winding.inductance.*widest gap'):
+        ideal_stage(**WINDING, effects__motor__winding=(1.0, 1.5, 1.0, 1.0))
+
+
+def test_seats_beyond_the_motors_leave_their_gaps_the_whole_range() -> None:
+    wide = build(PlantParameters, {'stop.seat_radius': 1.0})
+    assert widest_gap(wide) == wide.machine.gap_max
 
 
 def test_against_the_rail_a_current_rises_as_resistance_and_inductance_let_it() -> None:

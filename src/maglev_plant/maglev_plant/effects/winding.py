@@ -70,7 +70,7 @@ def widest_gap(parameters: PlantParameters) -> float:
     tilt = machine.phi_max, machine.theta_max
     lever = machine.radius + max(0.0, *parameters.effects.motor.place_along)
     across = max(abs(place) for place in parameters.effects.motor.place_across)
-    return machine.gap_max + max((lever - seat) * t for t in tilt) + across * max(tilt)
+    return machine.gap_max + max(0.0, lever - seat) * max(tilt) + across * max(tilt)
 
 
 def winding_arrays(parameters: PlantParameters, machine: Machine, step: float) -> WindingArrays:
@@ -97,7 +97,8 @@ def winding_arrays(parameters: PlantParameters, machine: Machine, step: float) -
     arrays.inductance[:] -= inductance(arrays.block[0], 1.0, parameters.machine.gap_max)
     arrays.fixed = given.inductance
     set_current_loop(arrays, parameters.amplifier.bandwidth, step)
-    widest = inductance(arrays.block[0], 1.0, widest_gap(parameters))
+    strongest = max(parameters.effects.motor.winding)
+    widest = inductance(arrays.block[0], strongest, widest_gap(parameters))
     if arrays.on and widest <= 0.0:
         raise ParameterError(
             f"parameter 'effects.winding.inductance' is {given.inductance:g} H, it must be more "
