@@ -116,8 +116,21 @@ def test_a_controller_is_waited_for_and_lands_without_its_reference(
     assert impact_speed(watching) < 0.05
     assert 'the reference stopped' in graph['controller'].output
     watching.wait(lambda: watching.newest(CONTROLLER_STATE).mode == ControllerState.DISABLED)
+    watching.wait(lambda: idles(watching), timeout=10.0)
     answer = watching.call('/controller/enable', True)
     assert answer.success
+    watching.wait(lambda: idles(watching), timeout=10.0)
+
+
+def test_nothing_hurries_before_there_is_a_reference(nodes: Nodes, watching: Observer) -> None:
+    nodes.start('plant')
+    nodes.start('controller', 'enabled:=false')
+    watching.wait(lambda: watching.newest(CONTROLLER_STATE) is not None)
+    assert idles(watching)
+    assert watching.call('/controller/enable', True).success
+    assert idles(watching)
+    nodes.start('reference', 'lift_off.time:=0.2')
+    watching.wait(lambda: airborne(watching))
 
 
 def test_all_that_a_flight_bears(nodes: Nodes, watching: Observer) -> None:

@@ -197,12 +197,8 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
 
     def _awaits_reference(self, sequence: int) -> bool:
         """Whether an answer waits; without current only so that the loop sleeps, see _watch."""
-        supervisor = self.supervisor
-        if self._reference_lost or supervisor.mode == Mode.LANDING:
-            return False
-        if supervisor.mode in (Mode.DISABLED, Mode.FAULT) and supervisor.references.newest < 0:
-            return False
-        return supervisor.references.find(sequence) < 0
+        landing = self.supervisor.mode == Mode.LANDING
+        return not landing and self.supervisor.references.find(sequence) < 0
 
     def _answer(self, message: Any) -> None:
         self._pending = None
@@ -254,15 +250,19 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
     def _watch(self) -> None:
         """In lockstep, give a lost reference up: the answer that waits for it starts a landing.
 
-        Where no current is wanted there is nothing to lose.
+        Where no current is wanted there is nothing to lose. A run's first answer waits for ever.
         """
-        if self._pending is None or self.supervisor.references.newest < 0:
+        if self._pending is None:
             return
-        waiting = self.supervisor.mode == Mode.WAITING
-        needless = not self.supervisor.flying and (self._reference_over or not waiting)
+        supervisor, begun = self.supervisor, self.supervisor.references.newest >= 0
+        waiting = supervisor.mode == Mode.WAITING
+        if waiting and not begun and self._sequence < 0:
+            return
+        over = self._reference_over or self._reference_lost or not begun
+        needless = not supervisor.flying and (over or not waiting)
         patience = _IDLE_PATIENCE if needless else self.parameters.reference_timeout
         if time.monotonic() - self._pending_since > patience:
-            self._reference_lost = not needless
+            self._reference_lost |= not needless
             self._answer(self._pending)
 
     def may_stop(self) -> bool:
