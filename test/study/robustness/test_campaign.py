@@ -339,6 +339,8 @@ def test_a_machine_is_written_for_the_graph(plan: Plan, tmp_path: Path) -> None:
         (['--law', 'ours'], "there is no law 'ours'"),
         (['--experiment', 'step'], "there is no experiment 'step', there are: ellipse, forces,"),
         (['--overlay', 'none.yaml'], 'cannot read parameter file'),
+        (['--scheduler', 'host'], "'host' is no address of a scheduler: missing port number"),
+        (['--out', '/proc/none'], "cannot write to '/proc/none': No such file or directory"),
     ],
 )
 def test_wrong_use_is_told_in_a_line(

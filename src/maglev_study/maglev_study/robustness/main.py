@@ -55,7 +55,8 @@ def command(name: str, options: argparse.Namespace, work: Work) -> int:
         except (ParameterError, MissingLibraryError) as error:
             reason = str(error)
         except OSError as error:
-            reason = error.strerror or str(error)
+            reason = f"cannot write to '{error.filename}': " if error.filename else ''
+            reason += error.strerror or str(error)
         except KeyboardInterrupt:
             code, reason = INTERRUPTED, 'interrupted'
     if reason:

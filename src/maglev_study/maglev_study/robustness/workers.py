@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 import joblib
 
 from maglev_model.optional import MissingLibraryError, needed
+from maglev_model.parameters import ParameterError
 from maglev_study.closed_loop import warm_up
 
 T = TypeVar('T')
@@ -31,7 +32,8 @@ def results(
     In processes of their own with more than one of ``jobs``; with a ``scheduler`` on that Dask
     cluster, where what a worker had that died is given to another. One thread a process.
 
-    Raises what the function raises, OSError where the scheduler cannot be reached or gives up, and
+    Raises what the function raises, OSError where the scheduler cannot be reached or gives up,
+    ParameterError for an address that is none, and
     :class:`~maglev_model.optional.MissingLibraryError` for a scheduler without Dask, and for
     workers without these packages.
     """
@@ -59,7 +61,11 @@ def _on_cluster(
     with needed('distributed', '--scheduler'):
         from distributed import Client, KilledWorker, as_completed
         from distributed.client import FutureCancelledError
-    with Client(scheduler, timeout=PATIENCE) as client:
+    try:
+        client = Client(scheduler, timeout=PATIENCE)
+    except ValueError as error:
+        raise ParameterError(f"'{scheduler}' is no address of a scheduler: {error}") from error
+    with client:
         futures = client.map(function, *zip(*tasks, strict=True), pure=False)
         try:
             for future in as_completed(futures):
