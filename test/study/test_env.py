@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from typing import Any
 
@@ -107,6 +108,11 @@ def test_who_lets_go_of_the_platen_has_lost_it() -> None:
 def test_what_it_refuses() -> None:
     with pytest.raises(ParameterError, match="'action' is 'forces', it must be accelerations or"):
         StageEnv(action='forces')
+    for duration in (-1.0, 0.0, math.nan, math.inf):
+        with pytest.raises(
+            ParameterError, match=f"'duration' is {duration} s, it must last a sample"
+        ):
+            StageEnv(duration=duration)
     with pytest.raises(TypeError, match="'plant' is a dict, it takes PlantParameters"):
         StageEnv(plant={'seed': 1})  # type: ignore[arg-type]
     with pytest.raises(ParameterError, match="'sample_time' of plant and controller"):

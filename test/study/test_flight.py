@@ -93,5 +93,6 @@ def test_what_is_wrong_is_named() -> None:
         fly('ellipse', plant={'sample_time': 0.002})
     with pytest.raises(ParameterError, match='unreachable reference'):
         fly('ellipse', reference={'sinusoids.x.amplitude': [0.05], 'limits.upper': [0.031] * 5})
-    with pytest.raises(ParameterError, match='cannot read parameter file'):
-        fly('ellipse', files=['missing.yaml'])
+    for files in ('missing.yaml', Path('missing.yaml'), ['missing.yaml']):
+        with pytest.raises(ParameterError, match=r"cannot read parameter file 'missing\.yaml'"):
+            fly('ellipse', files=files)

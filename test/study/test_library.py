@@ -99,6 +99,11 @@ def test_simulate_runs_the_plant_under_a_function() -> None:
             r'one of plant\., controller\., re',
         ),
         (
+            lambda: maglev.sweep('controller.y.bandwith', (100.0,)),
+            ParameterError,
+            "no parameter 'y.bandwith', did you mean 'y.bandwidth'",
+        ),
+        (
             lambda: maglev.sweep('plant.seed', (1,), plant=maglev.PlantParameters()),
             TypeError,
             "'plant' is swept over, so it takes a dict",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -82,6 +84,21 @@ def test_no_gains_within_the_guarantee_make_it_unstable(loop: MultiLoop) -> None
     assert current.gain < found < 20.0
 
 
+def test_it_is_the_least_over_all_frequencies_not_over_some() -> None:
+    """At rest the worst one lies between two that are looked at first."""
+    loop = multiloop()
+    z = np.exp(1j * np.geomspace(10.0, 1000.0, 2000) * loop.period)[:, None, None]
+    plant, law = (
+        part.output @ np.linalg.solve(z * np.eye(len(part.state)) - part.state, part.input)
+        + part.direct
+        for part in (loop.plant, loop.controller)
+    )
+    opened = -law @ plant
+    balanced = 0.5 * (np.eye(8) - opened) @ np.linalg.inv(np.eye(8) + opened)
+    least = 1.0 / structured_bound(balanced).max()
+    assert loop.guarantees()[0].disk == pytest.approx(least, rel=1e-4)
+
+
 def test_a_sample_late_is_guaranteed_less() -> None:
     gains = [multiloop(PLANT, speed=0.1, delay=delay).guarantees()[0].gain for delay in (0, 1, 8)]
     assert gains[0] > gains[1] > gains[2] == 0.0
@@ -93,6 +110,10 @@ def test_what_has_no_loop_of_all_axes() -> None:
     other = build(ControllerParameters, {'law': 'maglev_study.none'})
     with pytest.raises(ParameterError, match='law'):
         multiloop(controller=other)
+    with pytest.raises(ParameterError, match="'delay' is -1 samples, it must not be negative"):
+        multiloop(delay=-1)
+    with pytest.raises(ParameterError, match="'speed' is nan, it must be finite"):
+        multiloop(speed=math.nan)
 
 
 def test_an_axis_without_control_has_no_part_in_it() -> None:

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, ClassVar
 
@@ -76,8 +77,8 @@ class StageEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     when the platen meets a stop or cannot be measured, and truncated after its duration.
 
     ``course`` draws the reference, :func:`moves` by default. :meth:`default_action` is what the
-    default law would do. Raises ParameterError for another ``action``, TypeError for what are no
-    tables.
+    default law would do. Raises ParameterError for another ``action`` and a ``duration`` without a
+    sample, TypeError for what are no tables.
     """
 
     metadata: ClassVar[dict[str, Any]] = {'render_modes': []}
@@ -97,6 +98,8 @@ class StageEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             raise ParameterError(f"'action' is '{action}', it must be accelerations or currents")
         self.render_mode = render_mode
         self._plant = a_table(PlantParameters, plant, 'plant')
+        if not self._plant.sample_time <= duration < math.inf:
+            raise ParameterError(f"'duration' is {duration} s, it must last a sample or longer")
         self._regulator = Regulator(a_table(ControllerParameters, controller, 'controller'))
         if self._plant.sample_time != self._regulator.parameters.sample_time:
             raise ParameterError("parameter 'sample_time' of plant and controller are not the same")

@@ -88,7 +88,7 @@ def fly(
     trajectory: str | None = None,
     *,
     duration: float | None = None,
-    files: Sequence[str | Path] = (),
+    files: Sequence[str | Path] | str | Path = (),
     plant: PlantParameters | Mapping[str, object] | None = None,
     controller: ControllerParameters | Mapping[str, object] | None = None,
     reference: Mapping[str, object] | None = None,
@@ -109,6 +109,7 @@ def fly(
     MeasurementFault when the regulator gives the platen up, LawFault when a law of your own fails,
     TypeError for a trajectory that is no name.
     """
+    files = (files,) if isinstance(files, str | Path) else files
     followed: dict[str, object] = {}
     if not isinstance(trajectory, str | None):
         raise TypeError(

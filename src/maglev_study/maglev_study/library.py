@@ -11,18 +11,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import MeasurementFault
 from maglev_model.axes import AXES
-from maglev_model.parameters import ParameterError
+from maglev_model.parameters import ParameterError, specs, unknown_parameter
 from maglev_model.stage import EncoderSample
 from maglev_plant import simulation
 from maglev_plant.parameters import PlantParameters
+from maglev_reference.parameters import ReferenceParameters
 from maglev_study.arguments import a_table
 from maglev_study.closed_loop import LawFault
 from maglev_study.flight import FlightRecord, fly
 from maglev_study.robustness.workers import results
 
-NODES = ('plant', 'controller', 'reference')
+NODES = {
+    'plant': PlantParameters,
+    'controller': ControllerParameters,
+    'reference': ReferenceParameters,
+}
 
 
 def simulate(
@@ -79,7 +85,7 @@ def sweep(
     ``sweep('controller.y.bandwidth', (100.0, 200.0), 'ellipse', duration=5.0)``; all else is given
     as to :func:`~maglev_study.flight.fly`. In processes of their own with more than one of
     ``jobs``. A value that is refused, or with which the platen is given up or the law fails, has
-    its reason in the result. Raises ParameterError for a parameter of no node.
+    its reason in the result. Raises ParameterError for a name that no parameter of a node has.
     """
     node, dot, name = parameter.partition('.')
     if node not in NODES or not dot:
@@ -87,6 +93,9 @@ def sweep(
             f"'{parameter}' names no node, it must begin with one of "
             f'{", ".join(f"{node}." for node in NODES)} as in controller.y.bandwidth'
         )
+    known = specs(NODES[node])
+    if name not in known:
+        raise unknown_parameter(name, known)
     shared = given.pop(node, None) or {}
     if not isinstance(shared, Mapping):
         raise TypeError(f"'{node}' is swept over, so it takes a dict of parameters by name")
