@@ -113,6 +113,7 @@ def test_a_first_point_at_the_hover_changes_nothing() -> None:
         (('x',), (Point(0.5, (0.0,), (0.0, 0.0)),), 'has 2 values of velocity for 1 axes'),
         (('x',), (Point(0.5, (math.nan,)),), r'position of x is nan at 0\.5 s'),
         (('x',), (Point(math.nan, (0.0,)),), 'point 1 is at nan s'),
+        (('x',), (Point(5e8, (0.0,)),), r'point 1 is at 5e\+08 s, it must lie in \[0, 36000\] s'),
         (('x',), (Point(0.0, (0.0,)), *STEP, *STEP), r'point 3 is at 0\.5 s, .* after 0\.5 s'),
         (('x',), (Point(0.0, (0.0,)), Point(0.0, (0.0,))), r'point 2 is at 0 s, .* after 0 s'),
         (('x',), (*STEP, Point(0.5, (0.0,))), r'point 2 is at 0\.5 s, it must come after 0\.5 s'),

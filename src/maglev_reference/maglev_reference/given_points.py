@@ -20,6 +20,7 @@ from maglev_reference.motion import Kinematics, State
 from maglev_reference.parameters import ReferenceParameters
 
 _PIECE = 1000  # samples checked together, a few milliseconds
+_LONGEST = 36_000.0  # as a run's duration [s]
 _HERE = 1e-6  # how far a first point at time 0 may be from where the platen hovers [m, rad]
 
 
@@ -105,8 +106,10 @@ class _Knots(NamedTuple):
 def _knots(points: Sequence[Point], columns: list[int], hover: FloatArray) -> _Knots:
     """The hover and the points after it."""
     given = np.array([point.time for point in points])
-    for number in np.flatnonzero(~(np.isfinite(given) & (given >= 0.0))):
-        raise UnreachableError(f'point {number + 1} is at {given[number]:g} s')
+    for number in np.flatnonzero(~((given >= 0.0) & (given <= _LONGEST))):
+        raise UnreachableError(
+            f'point {number + 1} is at {given[number]:g} s, it must lie in [0, {_LONGEST:g}] s'
+        )
     begun = int(given[0] == 0.0)  # with the hover itself
     time = np.concatenate((np.zeros(1 - begun), given))
     state = Kinematics(np.tile(hover, (len(time), 1)), *np.zeros((2, len(time), 5)))
