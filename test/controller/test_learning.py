@@ -248,6 +248,24 @@ def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
         iterative_learning(build(ControllerParameters, {**SHORT, 'learning.file': str(path)}))
 
 
+@pytest.mark.parametrize(
+    ('given', 'reason'),
+    [
+        ({'learning.period': 0.0}, "'learning.period' is 0, nothing is learned"),
+        ({'learning.passes': 0}, "it is not there, and with 'learning.passes' 0"),
+        ({'learning.file': '/proc/none/learned.npz'}, "cannot be written to '/proc/none'"),
+        ({'learning.file': '/proc'}, 'no file'),
+    ],
+)
+def test_a_file_that_would_not_be_used_is_refused(
+    given: dict[str, object], reason: str, tmp_path: Path
+) -> None:
+    path = {'learning.file': str(tmp_path / 'learned.npz')}
+    assert iterative_learning(build(ControllerParameters, {**SHORT, **path}))
+    with pytest.raises(ParameterError, match=rf"parameter 'learning.file' is '.*': .*{reason}"):
+        iterative_learning(build(ControllerParameters, {**SHORT, **path, **given}))
+
+
 # -- in the graph as in the library ----------------------------------------------------------------
 
 

@@ -160,6 +160,21 @@ def test_several_nodes_end_when_all_have_done_or_one_has_failed(
     assert (done.returncode, found) == (code, said), done.stderr
 
 
+def test_what_stands_before_ros_args_is_no_parameter() -> None:
+    program = SEVERAL.replace('{nodes}', "made('a', 0.1)")
+    for command in (['--params-file', 'x.yaml'], ['--ros-args', '-p', 'x:=1', '--', 'left']):
+        done = subprocess.run(
+            [sys.executable, '-c', program, *command],
+            capture_output=True,
+            text=True,
+            timeout=30,
+            check=False,
+        )
+        assert (done.returncode, done.stdout) == (1, '')
+        wrong = command[0] if command[0] != '--ros-args' else 'left'
+        assert done.stderr.startswith(f"several: error: '{wrong}' is no argument: -p, -r and --par")
+
+
 def test_who_acknowledges_nothing_is_waited_for_once_and_not_by_each_node(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

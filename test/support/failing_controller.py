@@ -12,6 +12,7 @@ from maglev_msgs.msg import Measurement
 from maglev_node.executable import run_nodes
 
 FROM = 1200
+HOW = sys.argv.pop(1)
 
 
 class _Failing(ControllerNode):
@@ -25,12 +26,11 @@ class _Failing(ControllerNode):
         self._in_loop = False
 
     def _take_references(self) -> None:
-        how = sys.argv[1]
         if self._sequence >= FROM and not self._has_failed:
-            if how == ('in_loop' if self._in_loop else 'beside'):
+            if ('in_loop' if self._in_loop else 'beside') == HOW:
                 self._has_failed = True
                 raise RuntimeError('made to fail')
-            if how == 'in_loop':
+            if HOW == 'in_loop':
                 return  # so that they run out
         super()._take_references()
 
@@ -42,9 +42,9 @@ def _fail(step: Callable[..., None]) -> Callable[..., None]:
     def failing(self: Any, row: int, gap: Any, x: float, z: float) -> None:
         nonlocal samples
         samples += 1
-        if samples > FROM and sys.argv[1] == 'law':
+        if samples > FROM and HOW == 'law':
             raise RuntimeError('made to fail')
-        if samples > FROM and sys.argv[1] == 'measurement':
+        if samples > FROM and HOW == 'measurement':
             gap = gap * float('nan')
         step(self, row, gap, x, z)
 
@@ -52,6 +52,5 @@ def _fail(step: Callable[..., None]) -> Callable[..., None]:
 
 
 if __name__ == '__main__':
-    how = sys.argv[1]
     supervision.Supervisor.step = _fail(supervision.Supervisor.step)  # type: ignore[method-assign]
     run_nodes('controller', _Failing)

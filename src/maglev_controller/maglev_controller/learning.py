@@ -28,6 +28,7 @@ import numpy as np
 
 from maglev_controller.control_arrays import ControlArrays
 from maglev_controller.design.digits import rounded
+from maglev_controller.learning_parameters import LearningParameters
 from maglev_controller.learning_step import (
     DONE,
     GREW,
@@ -221,14 +222,32 @@ class IterativeLearning:
 def iterative_learning(parameters: ControllerParameters) -> IterativeLearning | None:
     """What these parameters ask for, with what its file holds where that is there; None for none.
 
-    Raises ParameterError as the class and its :meth:`~IterativeLearning.load` do.
+    Raises ParameterError as the class and its :meth:`~IterativeLearning.load` do, and for a file
+    that nothing is learned for, that is not there to be flown, or cannot be written.
     """
-    if parameters.learning.period == 0.0:
+    given = parameters.learning
+    if given.file:
+        _check_file(given)
+    if given.period == 0.0:
         return None
-    learning, path = IterativeLearning(parameters), Path(parameters.learning.file)
+    learning, path = IterativeLearning(parameters), Path(given.file)
     if path.is_file():
         learning.load(path)
     return learning
+
+
+def _check_file(given: LearningParameters) -> None:
+    path, wrong = Path(given.file), ''
+    if given.period == 0.0:
+        wrong = "'learning.period' is 0, nothing is learned"
+    elif path.exists() and not path.is_file():
+        wrong = 'that is no file'
+    elif not (path.exists() or given.passes):
+        wrong = "it is not there, and with 'learning.passes' 0 nothing is learned"
+    elif given.passes and not os.access(path.parent, os.W_OK):
+        wrong = f"what is learned cannot be written to '{path.parent}'"
+    if wrong:
+        raise ParameterError(f"parameter 'learning.file' is '{path}': {wrong}")
 
 
 def _kernels(bandwidth: float, period: float, delay: int) -> FloatArray:

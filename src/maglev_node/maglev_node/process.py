@@ -17,6 +17,7 @@ import rclpy
 from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
 
 from maglev_model import ahead
 from maglev_model.command import leave_with
@@ -98,13 +99,23 @@ def main(
         os.nice(_BACKGROUND_NICENESS)
     ahead.use()
     try:
-        code = run(name, caught, *(partial(_make, node) for node in nodes))
+        code = _misplaced(name) or run(name, caught, *(partial(_make, node) for node in nodes))
     except Exception:
         sys.excepthook(*sys.exc_info())
         code = 70
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(code)
+
+
+def _misplaced(name: str) -> int:
+    """1 where there are arguments that no node would see, such as parameters not ROS's; says so."""
+    others = remove_ros_args(sys.argv)[1:]
+    if not others:
+        return 0
+    text = f"'{others[0]}' is no argument: -p, -r and --params-file come after --ros-args"
+    print(f'{name}: error: {text}', file=sys.stderr, flush=True)
+    return 1
 
 
 def say_help(name: str, *nodes: str | type[MaglevNode[Any]]) -> NoReturn:
