@@ -95,3 +95,66 @@ def test_one_that_does_not_compile_is_refused(module: str, tmp_path: Path) -> No
     (tmp_path / package / 'broken.py').write_text(broken)
     with pytest.raises(ParameterError, match='cannot be compiled'):
         ideal_stage(effects__friction__model=f'{package}.broken')
+
+
+FAILS = """
+import math
+
+
+def force(velocity, level, step, memory):
+    return {force}
+
+
+def forces(gap, i_d, i_q, out):
+    {forces}
+
+
+def reading(length, channel, sample, memory):
+    return {reading}
+"""
+
+
+@pytest.mark.parametrize(
+    ('group', 'body', 'why'),
+    [
+        ('friction', 'level / velocity', "'force' raised ZeroDivisionError: division by zero"),
+        ('motor', 'out[0] = 1.0', r"'forces' gives \[ 1\. nan\] at rest"),
+        ('sensor', 'math.inf', "'reading' gives inf at rest"),
+    ],
+)
+def test_one_that_fails_at_rest_is_refused(
+    group: str, body: str, why: str, module: str, tmp_path: Path
+) -> None:
+    package = module.partition('.')[0]
+    bodies = {'force': '0.0', 'forces': 'out[:] = 0.0', 'reading': 'length'}
+    bodies[{'friction': 'force', 'motor': 'forces', 'sensor': 'reading'}[group]] = body
+    (tmp_path / package / 'fails.py').write_text(FAILS.format(**bodies))
+    with pytest.raises(ParameterError, match=rf"effects\.{group}\.model' is .*{why}"):
+        ideal_stage(**{f'effects__{group}__model': f'{package}.fails'})
+
+
+@pytest.mark.parametrize('group', ['friction', 'motor', 'sensor'])
+def test_one_that_fails_in_flight_is_no_force_of_0(group: str, module: str, tmp_path: Path) -> None:
+    package = module.partition('.')[0]
+    bodies = {
+        'force': '1.0 / (0.0 if velocity < 0.0 else 1.0)',
+        'forces': 'out[:] = 1.0 / (0.0 if i_q > 0.0 else 1.0)',
+        'reading': 'length / (0.0 if sample > 0 else 1.0)',
+    }
+    (tmp_path / package / 'falls.py').write_text(FAILS.format(**bodies))
+    stage = ideal_stage(
+        guide__coulomb=(0.0, 0.2, 0.0, 0.0, 0.0),
+        guide__locked=ONLY_X,
+        **{f'effects__{group}__model': f'{package}.falls'},
+    )
+    assert np.isfinite(stage.read().x)
+    stage.write(ZERO, [0.0, 1.0, 0.0, 1.0])
+    for _ in range(5):
+        sample = stage.read()
+    assert np.isnan(sample.x)
+
+
+def test_a_model_is_compiled_once_and_kept(module: str) -> None:
+    stages = [ideal_stage(effects__friction__model=module) for _ in range(2)]
+    first, second = (stage.arrays.effects.friction.address for stage in stages)
+    assert first == second

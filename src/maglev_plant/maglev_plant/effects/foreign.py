@@ -11,20 +11,25 @@ Numba compiles:
   them: F_V positive where it widens the gap.
 - ``reading(length, channel, sample, memory)``: what encoder ``channel`` (0..5) reads of a length
   [m]; ``memory`` as above.
+
+Each is tried once, at rest at 25 mm. What raises in flight gives NaN, which no flight goes on with.
 """
 
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable
 from typing import Any
+
+import numpy as np
 
 from maglev_model.compiled import intrinsic, numba
 from maglev_model.parameters import ParameterError
 from maglev_model.plugins import find_plugin
 
 _MEMORY = 4
-_kept: dict[str, Any] = {}
+_kept: list[Any] = []
 """Compiled models, which must live as long as their addresses are called."""
 
 
@@ -75,6 +80,7 @@ def call_sensor(context, address, length, channel, sample, memory):  # type: ign
     return build(context, address, length, channel, sample, memory)
 
 
+@functools.cache
 def friction_address(name: str) -> int:
     """Address of the ``force`` of a module; raises ParameterError."""
 
@@ -83,13 +89,20 @@ def friction_address(name: str) -> int:
 
         @numba().cfunc('float64(float64, float64, float64, CPointer(float64))')
         def call(velocity, level, step, memory):  # type: ignore[no-untyped-def]
-            return force(velocity, level, step, carray(memory, _MEMORY))
+            try:
+                return force(velocity, level, step, carray(memory, _MEMORY))
+            except Exception:
+                return math.nan
 
         return call
 
-    return _address('effects.friction.model', name, 'force', made)
+    def tried(force: Any) -> Any:
+        return force(0.0, 1.0, 1e-3, np.zeros(_MEMORY))
+
+    return _address('effects.friction.model', name, 'force', made, tried)
 
 
+@functools.cache
 def motor_address(name: str) -> int:
     """Address of the ``forces`` of a module; raises ParameterError."""
 
@@ -98,13 +111,22 @@ def motor_address(name: str) -> int:
 
         @numba().cfunc('void(float64, float64, float64, CPointer(float64))')
         def call(gap, i_d, i_q, out):  # type: ignore[no-untyped-def]
-            forces(gap, i_d, i_q, carray(out, 2))
+            try:
+                forces(gap, i_d, i_q, carray(out, 2))
+            except Exception:
+                out[0] = math.nan
 
         return call
 
-    return _address('effects.motor.model', name, 'forces', made)
+    def tried(forces: Any) -> Any:
+        out = np.full(2, np.nan)
+        forces(0.025, 0.0, 0.0, out)
+        return out
+
+    return _address('effects.motor.model', name, 'forces', made, tried)
 
 
+@functools.cache
 def sensor_address(name: str) -> int:
     """Address of the ``reading`` of a module; raises ParameterError."""
 
@@ -113,22 +135,43 @@ def sensor_address(name: str) -> int:
 
         @numba().cfunc('float64(float64, int64, int64, CPointer(float64))')
         def call(length, channel, sample, memory):  # type: ignore[no-untyped-def]
-            return reading(length, channel, sample, carray(memory, _MEMORY))
+            try:
+                return reading(length, channel, sample, carray(memory, _MEMORY))
+            except Exception:
+                return math.nan
 
         return call
 
-    return _address('effects.sensor.model', name, 'reading', made)
+    def tried(reading: Any) -> Any:
+        return reading(0.025, 0, 0, np.zeros(_MEMORY))
+
+    return _address('effects.sensor.model', name, 'reading', made, tried)
 
 
-@functools.cache
-def _address(parameter: str, name: str, function: str, make: Callable[[Any], Any]) -> int:
-    module = find_plugin(parameter, name, (function,))
+def _address(
+    parameter: str,
+    name: str,
+    function: str,
+    make: Callable[[Any], Any],
+    tried: Callable[[Any], Any],
+) -> int:
+    """Of the compiled function, once it is ``tried`` and gives what is finite."""
+    module, where = find_plugin(parameter, name, (function,)), f"parameter '{parameter}' is"
+    model = numba().njit(getattr(module, function))
     try:
-        compiled = make(numba().njit(getattr(module, function)))
+        compiled = make(model)
     except numba().core.errors.NumbaError as error:
         reason = str(error).strip().splitlines()[-1]
         raise ParameterError(
-            f"parameter '{parameter}' is '{name}', whose '{function}' cannot be compiled: {reason}"
+            f"{where} '{name}', whose '{function}' cannot be compiled: {reason}"
         ) from error
-    _kept[f'{name}.{function}'] = compiled
+    try:
+        found = tried(model)
+    except Exception as error:
+        raise ParameterError(
+            f"{where} '{name}', whose '{function}' raised {type(error).__name__}: {error}"
+        ) from error
+    if not np.all(np.isfinite(found)):
+        raise ParameterError(f"{where} '{name}', whose '{function}' gives {found} at rest")
+    _kept.append(compiled)
     return int(compiled.address)
