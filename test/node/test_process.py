@@ -55,6 +55,7 @@ class Node:
 @pytest.fixture(autouse=True)
 def handlers(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """No middleware, and the handlers of before afterwards."""
+    monkeypatch.setattr('sys.argv', ['node'])
     monkeypatch.setattr(process, 'prepare_middleware', lambda: None)
     monkeypatch.setattr(process, 'discovering', lambda _name: nullcontext())
     monkeypatch.setattr(process.rclpy, 'init', lambda **_: None)

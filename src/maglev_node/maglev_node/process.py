@@ -50,6 +50,7 @@ def run(name: str, caught: Sequence[int], *make_nodes: Callable[[], MaglevNode[A
     prepare_middleware()
     try:
         rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
+        _refuse_misplaced()
         with discovering(name):
             for make in make_nodes:
                 nodes.append(make())
@@ -99,7 +100,7 @@ def main(
         os.nice(_BACKGROUND_NICENESS)
     ahead.use()
     try:
-        code = _misplaced(name) or run(name, caught, *(partial(_make, node) for node in nodes))
+        code = run(name, caught, *(partial(_make, node) for node in nodes))
     except Exception:
         sys.excepthook(*sys.exc_info())
         code = 70
@@ -108,14 +109,12 @@ def main(
     os._exit(code)
 
 
-def _misplaced(name: str) -> int:
-    """1 where there are arguments that no node would see, such as parameters not ROS's; says so."""
-    others = remove_ros_args(sys.argv)[1:]
-    if not others:
-        return 0
-    text = f"'{others[0]}' is no argument: -p, -r and --params-file come after --ros-args"
-    print(f'{name}: error: {text}', file=sys.stderr, flush=True)
-    return 1
+def _refuse_misplaced() -> None:
+    """Raise NodeError for arguments that no node would see, such as parameters not ROS's."""
+    for argument in remove_ros_args(sys.argv)[1:]:
+        raise NodeError(
+            f"'{argument}' is no argument: -p, -r and --params-file come after --ros-args"
+        )
 
 
 def say_help(name: str, *nodes: str | type[MaglevNode[Any]]) -> NoReturn:
