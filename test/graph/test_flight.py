@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray
 from flight import (
     LONG,
     LOWER_STOP,
@@ -30,6 +31,7 @@ from maglev_msgs.msg import ControllerState, Measurement, Reference
 from maglev_node.topics import (
     CONTROLLER_PROGRESS,
     CONTROLLER_STATE,
+    DIAGNOSTICS,
     MEASUREMENT,
     PROGRESS,
     PROGRESS_PERIOD,
@@ -120,6 +122,23 @@ def test_a_controller_is_waited_for_and_lands_without_its_reference(
     answer = watching.call('/controller/enable', True)
     assert answer.success
     watching.wait(lambda: idles(watching), timeout=10.0)
+
+
+def test_a_stage_that_is_gone_is_told_of(nodes: Nodes, watching: Observer) -> None:
+    diagnostics = watching.node.poll(DIAGNOSTICS, DiagnosticArray)
+    graph = fly(nodes, LONG)
+    watching.wait(lambda: airborne(watching))
+    diagnostics.take()
+    graph['plant'].kill()
+    told: dict[str, str] = {}
+
+    def both() -> bool:
+        for message, _ in diagnostics.take():
+            told.update((one.name, one.message) for one in message.status if one.level == b'\x01')
+        return {'controller', 'reference'} <= set(told)
+
+    watching.wait(both, timeout=10.0)
+    assert all('no measurement for' in message for message in told.values())
 
 
 def test_nothing_hurries_before_there_is_a_reference(nodes: Nodes, watching: Observer) -> None:

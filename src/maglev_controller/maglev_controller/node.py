@@ -252,11 +252,9 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
 
         Where no current is wanted there is nothing to lose. A run's first answer waits for ever.
         """
-        if self._pending is None:
-            return
         supervisor, begun = self.supervisor, self.supervisor.references.newest >= 0
         waiting = supervisor.mode == Mode.WAITING
-        if waiting and not begun and self._sequence < 0:
+        if self._pending is None or (waiting and not begun and self._sequence < 0):
             return
         over = self._reference_over or self._reference_lost or not begun
         needless = not supervisor.flying and (over or not waiting)
@@ -361,15 +359,17 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
                 self._measurements.callback(taken[0])
 
     def diagnose(self) -> tuple[bytes, str, Mapping[str, object]]:
-        """ERROR in a fault and in a landing nobody asked for."""
+        """ERROR in a fault and in a landing nobody asked for, WARN without a stage."""
         supervisor = self.supervisor
         facts: dict[str, object] = {'mode': supervisor.mode.name, 'sequence': self._sequence}
-        foreign = supervisor.regulator.foreign
-        if foreign is not None:
+        if (foreign := supervisor.regulator.foreign) is not None:
             facts['law_longest_time'], facts['law_too_long'] = foreign.worst, foreign.late
         failed = supervisor.mode in (Mode.FAULT, Mode.LANDING) or 'landed' in supervisor.reason
         if failed and 'disabled' not in supervisor.reason:
             return DiagnosticStatus.ERROR, f'{supervisor.mode.name}: {supervisor.reason}', facts
+        silent = time.monotonic() - self._answered
+        if self._pending is None and self._sequence > 0 and silent > _SILENCE:
+            return DiagnosticStatus.WARN, f'no measurement for {silent:.1f} s', facts
         return DiagnosticStatus.OK, supervisor.reason or supervisor.mode.name.lower(), facts
 
     def spin(self, stop: Callable[[], bool]) -> None:

@@ -43,6 +43,7 @@ from maglev_reference.timeline import Timeline
 _LOOK_PERIOD = 0.25  # between two looks at the graph while the stage is flown [s]
 _LONGEST_TRAJECTORY = 100_000  # [bytes], which are read in less time than is published ahead
 _REMINDER = 5.0  # between two lines about what is waited for [s]
+_SILENCE = 0.5  # without a measurement from which on it is said [s]
 _IDLE_PERIOD = 0.02  # from one sample to the next while nothing shall move, in lockstep [s]
 _PLANNED = ('phase', 'segment', 'position', 'velocity', 'acceleration', 'target')
 _NEWS_TIME = 0.2  # in which an answer shows what a call has changed in the controller [s]
@@ -371,6 +372,9 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         }
         if self._run.left:
             return DiagnosticStatus.WARN, f'left the run: {self._run.left}', facts
+        silent = time.monotonic() - self._seen
+        if silent > _SILENCE:
+            return DiagnosticStatus.WARN, f'no measurement for {silent:.1f} s', facts
         return DiagnosticStatus.OK, 'running', facts
 
     def spin(self, stop: Callable[[], bool]) -> None:
