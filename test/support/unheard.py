@@ -16,10 +16,11 @@ from typing import Any
 
 import rclpy
 
+from maglev_model.wire import KEPT
 from maglev_msgs.msg import Measurement
 from maglev_node.dds import prepare_middleware
 from maglev_node.realtime import keep_heap
-from maglev_node.topics import KEPT, MEASUREMENT, sample_qos
+from maglev_node.topics import MEASUREMENT, sample_qos
 
 STRETCH = 3500  # samples
 
