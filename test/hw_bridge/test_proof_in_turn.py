@@ -101,6 +101,7 @@ def test_a_line_of_any_number_is_an_enable_line(line: int) -> None:
         (3, 'it reads as pressed when it is released again'),
         (4, 'a broken wire reads as released'),
         (5, 'with its plug back, the emergency stop reads as pressed'),
+        (7, 'the emergency stop reads as pressed still'),
     ],
 )
 def test_what_is_not_done_to_the_stop_is_seen(refused: int, text: str) -> None:

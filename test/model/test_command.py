@@ -55,6 +55,17 @@ def test_ctrl_c_ends_it_without_a_word() -> None:
     assert run(body, '| cat') == (130, 'a line\n', '')
 
 
+@pytest.mark.parametrize('body', ['pass', 'print("x" * 500_000)'])
+def test_a_full_disk_is_told_in_a_line(body: str) -> None:
+    code, _, errors = run(body, '> /dev/full')
+    assert code == 1
+    assert errors == 'error: cannot write to the standard output: No space left on device\n'
+
+
+def test_without_anywhere_to_print_it_ends_as_ever() -> None:
+    assert run('pass', '>&-') == (3, '', '')
+
+
 def test_a_defect_shows() -> None:
     code, _, errors = run('1 / 0', '| cat')
     assert code == 1

@@ -42,6 +42,25 @@ def test_a_closed_pipe_ends_it_without_a_word(small: Process) -> None:
     assert result.stdout.count('\n') == 2
 
 
+@pytest.mark.parametrize(
+    ('where', 'code', 'said'),
+    [
+        ('> /dev/full', 1, 'error: cannot write to the standard output: No space left on device\n'),
+        ('>&-', 0, ''),
+    ],
+)
+def test_where_nothing_can_be_printed(where: str, code: int, said: str) -> None:
+    script = f'"$@" {where}'
+    result = subprocess.run(
+        ['bash', '-c', script, '-', *COMMAND, 'pkg', 'list'],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert (result.returncode, result.stderr) == (code, said)
+
+
 def test_rates() -> None:
     assert summary([0.001, 0.003]) == (
         'average rate: 500.000\n\tmin: 0.001s max: 0.003s std dev: 0.00100s window: 2'

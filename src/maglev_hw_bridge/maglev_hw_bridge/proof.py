@@ -200,6 +200,7 @@ class Proof:
         if flows:
             raise WrongError(f'current flows on at {_named(flows)} after an emergency stop')
         self._operator.act(Act.RELEASE)
+        self._expect(False, 'the emergency stop reads as pressed still: release it, begin anew')
         self._tell('  emergency stop: no current: pass')
 
 

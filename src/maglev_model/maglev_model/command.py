@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import signal
 import sys
@@ -15,18 +16,38 @@ def leave_with(command: Callable[[], int]) -> NoReturn:
 
     When whoever reads the standard output has gone, as in ``command | head``, it ends as programs
     that a broken pipe kills do: without a word, 128 + SIGPIPE to a shell; after a Ctrl-C likewise.
+    What cannot be written, as to a disk that is full, is told in a line, with 1.
     """
     try:
         try:
             code = command()
         finally:
-            sys.stdout.flush()
+            if sys.stdout is not None:  # closed by whoever started it
+                sys.stdout.flush()
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _write_no_more()
         code = 128 + signal.SIGPIPE
     except KeyboardInterrupt:
         code = 128 + signal.SIGINT
+    except OSError as error:
+        if not (said := unwritten(error)):
+            raise
+        _write_no_more()
+        print(said, file=sys.stderr)
+        code = 1
     sys.exit(code)
+
+
+def unwritten(error: OSError) -> str:
+    """What to say of output that cannot be written, as to a full disk; '' for any other error."""
+    if error.errno not in (errno.ENOSPC, errno.EDQUOT) or error.filename is not None:
+        return ''
+    return f'error: cannot write to the standard output: {error.strerror}'
+
+
+def _write_no_more() -> None:
+    """Or what is still to be written would fail once more when the process ends."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 @contextlib.contextmanager

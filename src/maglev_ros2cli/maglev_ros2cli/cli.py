@@ -13,6 +13,7 @@ from typing import NoReturn
 
 import argcomplete
 
+from maglev_model.command import unwritten
 from maglev_ros2cli.errors import CommandError
 from maglev_ros2cli.parser import SUBSET, Parser
 
@@ -60,7 +61,8 @@ def run(words: Sequence[str]) -> int:
     try:
         arguments = parser(words).parse_args(words)
         code = arguments.run(arguments)
-        sys.stdout.flush()
+        if sys.stdout is not None:  # closed by whoever started it
+            sys.stdout.flush()
     except CommandError as error:
         print(error, file=sys.stderr)
         return 1
@@ -68,6 +70,11 @@ def run(words: Sequence[str]) -> int:
         return INTERRUPTED
     except BrokenPipeError:
         return _BROKEN_PIPE
+    except OSError as error:
+        if not (said := unwritten(error)):
+            raise
+        print(said, file=sys.stderr)
+        return 1
     return code or 0
 
 
@@ -85,7 +92,8 @@ def main() -> NoReturn:
         sys.exit(_TERMINATED)
 
     signal.signal(signal.SIGTERM, terminate)
-    sys.stdout.reconfigure(line_buffering=True)  # type: ignore[union-attr]
+    if sys.stdout is not None:
+        sys.stdout.reconfigure(line_buffering=True)  # type: ignore[union-attr]
     try:
         code: object = run(sys.argv[1:])
     except SystemExit as error:
@@ -95,7 +103,7 @@ def main() -> NoReturn:
         if not told_to_end:
             sys.excepthook(*sys.exc_info())
             code = 70
-    for stream in (sys.stdout, sys.stderr):
+    for stream in filter(None, (sys.stdout, sys.stderr)):
         with contextlib.suppress(OSError):
             stream.flush()
     os._exit(code if isinstance(code, int) else 0)
