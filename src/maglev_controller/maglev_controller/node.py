@@ -39,7 +39,7 @@ _HAND_PERIOD = 2e-4  # between two looks at the queues during a redesign [s]
 _AT_ONCE = 8  # measurements in one such look: a stage in lockstep has the next one ready at once
 _WATCH_PERIOD = 0.05  # between two looks at an answer that waits [s]
 _IDLE_PATIENCE = 0.04  # for a reference without which nothing is lost [s]
-_SILENCE = 0.5  # without a sample for this long the stage is taken for stopped [s]
+_SILENCE = {'lockstep': 2.0, 'realtime': 0.5}  # then the stage is taken for stopped [s]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -83,11 +83,8 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
     def __init__(self) -> None:
         super().__init__('controller', ControllerNodeParameters)
         self._lockstep = self.parameters.mode == 'lockstep'
-        self.supervisor = Supervisor(
-            self._law(self.parameters),
-            enabled=self.parameters.enabled,
-            hurried=not self._lockstep,
-        )
+        law, enabled = self._law(self.parameters), self.parameters.enabled
+        self.supervisor = Supervisor(law, enabled=enabled, hurried=not self._lockstep)
         self._longest_gap = self.parameters.measurement_timeout / self.parameters.sample_time
         self._sequence = -1
         self._pending: Any = None  # measurement that waits for its reference
@@ -152,7 +149,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
             self._currents.publish()
             return
         if sequence < self._sequence:
-            if self.supervisor.flying and time.monotonic() - self._answered < _SILENCE:
+            if self.supervisor.flying and not self._unheard():
                 return  # of a second stage, which will find the first and leave
             self.get_logger().warning('the stage began anew')
             self.supervisor.restart()
@@ -265,12 +262,13 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
 
     def may_stop(self) -> bool:
         """Land before ending, unless the stage is silent."""
-        supervisor = self.supervisor
-        if supervisor.flying and supervisor.mode != Mode.LANDING:
-            supervisor.disable()
+        if self.supervisor.flying and self.supervisor.mode != Mode.LANDING:
+            self.supervisor.disable()
             self._answer_pending()
-        silent = time.monotonic() - self._answered > _SILENCE
-        return not supervisor.flying or silent
+        return not self.supervisor.flying or self._unheard()
+
+    def _unheard(self) -> bool:
+        return time.monotonic() - self._answered > _SILENCE[self.parameters.mode]
 
     def _on_enable(self, request: Any, response: Any) -> Any:
         action = self.supervisor.enable if request.data else self.supervisor.disable
@@ -367,9 +365,9 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         failed = supervisor.mode in (Mode.FAULT, Mode.LANDING) or 'landed' in supervisor.reason
         if failed and 'disabled' not in supervisor.reason:
             return DiagnosticStatus.ERROR, f'{supervisor.mode.name}: {supervisor.reason}', facts
-        silent = time.monotonic() - self._answered
-        if self._pending is None and self._sequence > 0 and silent > _SILENCE:
-            return DiagnosticStatus.WARN, f'no measurement for {silent:.1f} s', facts
+        if self._pending is None and self._sequence > 0 and self._unheard():
+            text = f'no measurement for {time.monotonic() - self._answered:.1f} s'
+            return DiagnosticStatus.WARN, text, facts
         return DiagnosticStatus.OK, supervisor.reason or supervisor.mode.name.lower(), facts
 
     def spin(self, stop: Callable[[], bool]) -> None:
@@ -387,8 +385,8 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         """Land, without an executor, unless the stage is silent or a landing that fails."""
         if self.supervisor.mode == Mode.REGULATING:
             self.supervisor.disable()
-        since = time.monotonic()
-        while self.supervisor.flying and time.monotonic() - max(since, self._answered) < _SILENCE:
+        self._answered = time.monotonic()  # from now on it has its time
+        while self.supervisor.flying and not self._unheard():
             self._answer_pending()
             self._serve_by_hand()
             time.sleep(_HAND_PERIOD)
