@@ -101,6 +101,17 @@ def test_a_run_without_end_is_incomplete(run: Any, records: dict[str, Records]) 
     assert 'the run did not reach its end' in found['reasons']
 
 
+@pytest.mark.parametrize('phase', [Phase.LIFT_OFF, Phase.HOLD, Phase.TRACK])
+def test_a_run_that_is_known_from_its_middle_on_is_incomplete(
+    phase: Phase, records: dict[str, Records]
+) -> None:
+    first = int(np.flatnonzero(records['reference']['phase'] == phase)[0])
+    found = figures({key: part[first:] for key, part in records.items()})
+    lacks = [] if phase == Phase.LIFT_OFF else ['what is known of the run begins in flight']
+    assert found['reasons'] == lacks
+    assert found['verdict'] == ('incomplete' if lacks else 'pass')
+
+
 @pytest.mark.parametrize('lost', [(), (600,), (600, 799)])
 def test_a_landing_after_the_reference_was_ended_is_no_loss(
     lost: tuple[int, ...], records: dict[str, Records]

@@ -62,7 +62,7 @@ class RunMetrics:
 
     def __init__(self, run: RunParameters) -> None:
         self._run = run
-        self.started = False
+        self.started = self._whole = False  # from its lift-off on
         self.ended = False
         self.phase: int = Phase.REST
         self._expected = -1
@@ -112,6 +112,7 @@ class RunMetrics:
                 return block[:0]
             self.started = True
             first = int(moving[0])
+            self._whole = bool(phases[first] == Phase.LIFT_OFF)
         else:
             self._skip(int(block['sequence'][0]))
         ends = np.flatnonzero(phases[first:] == Phase.END)
@@ -132,7 +133,7 @@ class RunMetrics:
         self._faults.add(stamp, node, message)
 
     def result(self, *, cut_off: bool = False) -> dict[str, Any]:
-        """The content of ``metrics.json``; complete only when the run has reached its end.
+        """The content of ``metrics.json``; complete only from lift-off to the end of the run.
 
         :param cut_off: whether what was still to come may have been written no more.
         """
@@ -159,7 +160,7 @@ class RunMetrics:
         }
         if self._further:
             figures['further'] = {name: one.result() for name, one in self._further.items()}
-        return {**figures, **verdict(figures, run, complete=self.ended)}
+        return {**figures, **verdict(figures, run, whole=self._whole, ended=self.ended)}
 
     def _step_results(self, source: int) -> list[dict[str, Any]]:
         return [entry for step in self._steps for entry in step.results(source)]

@@ -14,7 +14,9 @@ _MISSING = 'number of missing samples'
 _NANOSECOND = 1e-9  # to which the stage rounds [s]
 
 
-def verdict(figures: Mapping[str, Any], run: RunParameters, *, complete: bool) -> dict[str, Any]:
+def verdict(
+    figures: Mapping[str, Any], run: RunParameters, *, whole: bool, ended: bool
+) -> dict[str, Any]:
     """The last part of ``metrics.json``: verdict, its reasons and the limits that were checked.
 
     Errors are those on the encoders' own scales, where the stage tells them; where it tells the
@@ -22,17 +24,20 @@ def verdict(figures: Mapping[str, Any], run: RunParameters, *, complete: bool) -
 
     :param figures: figures, as :meth:`~.run_metrics.RunMetrics.result` gathers them.
     :param run: with the limits and the counts.
-    :param complete: whether the run reached its end; otherwise it is ``incomplete`` or a failure.
+    :param whole: whether it is known from its lift-off on; ``ended``: whether it reached its end.
+        Otherwise it is ``incomplete`` or a failure.
     """
     limits = run.limits
     reasons = [f'fault in {fault}' for fault in figures['faults']]
     reasons += [*_axis_reasons(figures, run), *_step_reasons(figures, limits)]
     reasons += [*_sample_time_reason(figures, run), *_other_reasons(figures, limits)]
-    if figures['faults'] or (complete and reasons):
+    if figures['faults'] or (whole and ended and reasons):
         word = 'fail'
     else:
-        word = 'pass' if complete else 'incomplete'
-    if not complete:
+        word = 'pass' if whole and ended else 'incomplete'
+    if not whole and figures['run_samples']:
+        reasons.append('what is known of the run begins in flight')
+    if not ended:
         reasons.append('the run did not reach its end')
     return {'verdict': word, 'reasons': reasons, 'limits': checked_limits(limits)}
 
