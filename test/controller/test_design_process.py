@@ -27,6 +27,12 @@ def make(parameters):
 """
 
 
+@pytest.fixture(autouse=True)
+def patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A machine that is busy with other tests may take as long as it likes."""
+    monkeypatch.setattr('maglev_controller.design_process._LONGEST', 600.0)
+
+
 def begun(**overrides: object) -> DesignProcess:
     """A design that is done, with these parameters."""
     process = DesignProcess(
