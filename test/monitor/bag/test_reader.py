@@ -12,7 +12,7 @@ import pytest
 from made_up_run import TOPICS, open_bag, read, write_samples
 from mcap.reader import make_reader
 from mcap.writer import MCAP0_MAGIC
-from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
 from maglev_model.progress import Progress
 from maglev_monitor.bag.analysis import analyse
@@ -121,6 +121,37 @@ def test_a_sqlite_bag_without_metadata_is_read_file_by_file(
     counts, notes = read(killed)
     assert counts == {key: len(run) for key in TOPICS}
     assert notes == [f"'{killed}' has no metadata.yaml: read without it"]
+
+
+@pytest.mark.parametrize('damage', ['cut off', 'empty', 'bytes that are others'])
+@pytest.mark.parametrize('storage', [StoragePlugin.SQLITE3, StoragePlugin.MCAP])
+def test_a_damaged_compressed_file_is_told_as_such(
+    storage: StoragePlugin,
+    damage: str,
+    tmp_path: Path,
+    messages: dict[str, list[bytes]],
+    encoder: Any,
+) -> None:
+    writer = Writer(tmp_path / 'bag', version=9, storage_plugin=storage)
+    writer.set_compression(CompressionMode.FILE, CompressionFormat.ZSTD)
+    with writer:
+        reference = writer.add_connection(*TOPICS['reference'], typestore=encoder.store)
+        writer.write(reference, 1, messages['reference'][0])
+    (file,) = (tmp_path / 'bag').glob('*.zstd')
+    whole = file.read_bytes()
+    half = len(whole) // 2
+    damaged = {'cut off': whole[:half], 'empty': b'', 'bytes that are others': whole[:half] * 2}
+    file.write_bytes(damaged[damage])
+    with pytest.raises(BagError, match='cannot read the bag'):
+        read(tmp_path / 'bag')
+
+
+def test_diagnostics_that_are_none_are_told_as_such(tmp_path: Path) -> None:
+    writer = open_bag(tmp_path / 'bag')
+    writer.write('/diagnostics', [(b'compressed one by one', 1)])
+    writer.close()
+    with pytest.raises(BagError, match='cannot read the bag'):
+        read(tmp_path / 'bag')
 
 
 @pytest.mark.parametrize(

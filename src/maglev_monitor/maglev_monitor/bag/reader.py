@@ -13,7 +13,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 from rosbags.rosbag2 import Reader
-from rosbags.rosbag2.errors import ReaderError
+from rosbags.serde.errors import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
 from maglev_model.progress import Progress
@@ -85,13 +85,16 @@ class Bag:
                 for topic, _, data in messages:
                     self.counts[topic] = self.counts.get(topic, 0) + len(data)
                 yield self._batch(messages)
-        except (OSError, ValueError, ReaderError) as error:
-            raise BagError(f"cannot read the bag '{self.path}': {error}") from error
+        except (OSError, ValueError, SerdeError) as error:
+            raise self._unreadable(error) from error
         finally:
             if self._progress:
                 self._progress.end()
         if not self.counts:
             raise BagError(f"the bag '{self.path}' holds no message")
+
+    def _unreadable(self, error: Exception) -> BagError:
+        return BagError(f"cannot read the bag '{self.path}': {error}")
 
     def _read(self) -> Iterator[list[TopicMessages]]:
         if self._needs_rosbags():
@@ -136,14 +139,17 @@ class Bag:
             yield from self._read_one_by_rosbags(path)
 
     def _read_one_by_rosbags(self, path: Path) -> Iterator[list[TopicMessages]]:
-        with Reader(path) as reader:
-            messages = reader.messages()
-            while batch := list(itertools.islice(messages, _READER_BATCH)):
-                by_topic: dict[tuple[str, str], list[bytes]] = {}
-                for connection, _, data in batch:
-                    topic = (connection.topic, connection.msgtype)
-                    by_topic.setdefault(topic, []).append(bytes(data))
-                yield [TopicMessages(*topic, data) for topic, data in by_topic.items()]
+        try:
+            with Reader(path) as reader:
+                messages = reader.messages()
+                while batch := list(itertools.islice(messages, _READER_BATCH)):
+                    by_topic: dict[tuple[str, str], list[bytes]] = {}
+                    for connection, _, data in batch:
+                        topic = (connection.topic, connection.msgtype)
+                        by_topic.setdefault(topic, []).append(bytes(data))
+                    yield [TopicMessages(*topic, data) for topic, data in by_topic.items()]
+        except Exception as error:  # storages and decompressors have errors of their own
+            raise self._unreadable(error) from error
 
     def _batch(self, messages: Sequence[TopicMessages]) -> Batch:
         serialized: defaultdict[str, list[bytes]] = defaultdict(list)
