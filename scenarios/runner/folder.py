@@ -28,19 +28,34 @@ def make_folder(out: Path) -> Path:
     """
     refuse_full(out, RUN, 'a run')
     log, params = out / 'log', out / 'params'
-    probe = log / '.try'
     try:
         log.mkdir(parents=True, exist_ok=True)
         params.mkdir(exist_ok=True)
-        # A whole block at once, so that a full disk shows now and not when the stage flies.
-        probe.write_bytes(bytes(65536))
-        probe.unlink()
+        _write_block(log)
     except OSError as error:
-        for remove in (probe.unlink, log.rmdir, params.rmdir):
+        for remove in (log.rmdir, params.rmdir):
             with contextlib.suppress(OSError):
                 remove()
         raise cannot_write(out) from error
     return out.resolve()
+
+
+def trouble(out: Path) -> str:
+    """What keeps logs from being written, and so from telling of it; empty for nothing."""
+    try:
+        _write_block(out / 'log')
+    except OSError as error:
+        return f"cannot write to '{out}': {error.strerror}"
+    return ''
+
+
+def _write_block(folder: Path) -> None:
+    """Try it with a whole block at once, so that a full disk shows. Raises OSError."""
+    probe = folder / '.try'
+    try:
+        probe.write_bytes(bytes(65536))
+    finally:
+        probe.unlink(missing_ok=True)
 
 
 def refuse_full(out: Path, names: Sequence[str], what: str) -> None:

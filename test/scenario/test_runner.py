@@ -148,6 +148,17 @@ def test_a_full_disk_shows_before_the_start(tmp_path: Path) -> None:
     assert list((tmp_path / 'run').iterdir()) == []
 
 
+def test_a_folder_that_vanishes_in_flight_is_told(tree: Tree) -> None:
+    tree.behave('watchers', 'run')
+    process = tree.start('--out', str(tree.out))
+    tree.wait_started()
+    tree.out.rename(tree.path / 'moved')
+    os.kill(int((tree.path / 'pids' / 'controller').read_text()), signal.SIGKILL)
+    output, _ = process.communicate(timeout=30)
+    assert process.returncode == 1
+    assert f"cannot write to '{tree.out}': No such file or directory\nellipse: FAILED" in output
+
+
 def test_a_folder_that_holds_a_run_is_not_touched(tree: Tree) -> None:
     (tree.out / 'bag').mkdir(parents=True)
     code, output = tree.run()
