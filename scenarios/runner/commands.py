@@ -24,6 +24,7 @@ def main(arguments: Sequence[str]) -> int:
     check_only = arguments[0] == '--check'
     name, *options = arguments[check_only:]
     try:
+        _check_text(options)
         job = COMMANDS[name](options)
         return LATER if check_only else job()
     except HelpAskedError as text:
@@ -32,3 +33,12 @@ def main(arguments: Sequence[str]) -> int:
     except WrongUseError as error:
         complain(f'{name}: error: {error}')
         return 2
+
+
+def _check_text(options: Sequence[str]) -> None:
+    """Refuse what no node can be told."""
+    for word in options:
+        try:
+            word.encode()
+        except UnicodeEncodeError as error:
+            raise WrongUseError(f"'{word}' is no text in UTF-8: name it otherwise") from error

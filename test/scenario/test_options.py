@@ -81,6 +81,7 @@ def test_without_a_machine_file_each_node_starts_with_its_own(tree: Tree) -> Non
         (['--namespace', 'a//b'], "--namespace is 'a//b'"),
         (['--namespace', 'a__b'], "--namespace is 'a__b'"),
         (['--namespace', 'a-b'], "--namespace is 'a-b'"),
+        (['--out', 'caf\udce9'], "'caf\\udce9' is no text in UTF-8"),
         (['--params', 'flat.yaml'], "section 'controller' must hold 'ros__parameters'"),
     ],
 )
