@@ -244,6 +244,7 @@ END
         esac
       done
     setting PYTHONNOUSERSITE 1
+    echo 'unset PYTHONHOME' # with which .venv finds no library
     printf 'export NUMBA_CACHE_DIR=%q"/$(<%q)"\n' "$cache/numba" "$cache/numba/current"
     echo 'if [ "${MAGLEV_SETUP:-}" = test ]; then'
     first PATH "$cache/test-tools/bin"

@@ -122,6 +122,12 @@ def test_the_environment_is_the_same_in_every_shell_and_when_it_is_entered_again
     assert [each.stderr for each in said] == ['', '']
 
 
+def test_the_home_of_another_python_is_left() -> None:
+    script = f'. "{ROOT}/install/environment.bash"; python -c "import rclpy"'
+    environment = {'HOME': '/', 'PATH': f'{ROOT}/.venv/bin:/usr/bin:/bin', 'PYTHONHOME': '/nowhere'}
+    subprocess.run(['bash', '-euc', script], env=environment, check=True)
+
+
 def test_another_ros_is_sourced(machine: Machine) -> None:
     line = machine.refusal(ROS_DISTRO='humble')
     assert 'ROS humble is sourced' in line
