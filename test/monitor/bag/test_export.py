@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import builtins
 import csv
+import os
 import re
 import struct
 from pathlib import Path
@@ -188,6 +189,17 @@ def test_a_place_that_cannot_be_written(bag: Path, tmp_path: Path, capsys: Any) 
     out = tmp_path / 'nowhere' / 'run.npz'
     assert export([str(bag), '--format', 'npz', '--out', str(out)]) == FAILED
     assert f"cannot write '{out}': No such file" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('name', ['pipe', '.'])
+def test_what_is_no_file_is_not_replaced(
+    name: str, bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    os.mkfifo('pipe')
+    assert export([str(bag), '--format', 'npz', '--out', name]) == FAILED
+    assert f"cannot write '{name}': it is there and is no file" in capsys.readouterr().err
+    assert Path('pipe').is_fifo()
 
 
 def test_a_data_frame_in_one_line(bag: Path, whole: Table) -> None:

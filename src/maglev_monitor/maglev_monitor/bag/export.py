@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import errno
 import io
 from collections.abc import Callable
 from pathlib import Path
@@ -40,8 +41,10 @@ def write(found: Table, path: Path, form: str, progress: Progress | None = None)
     """Write a run, or another table, in one of :data:`FORMATS`; returns the files.
 
     They take their place when whole; how far csv is, which takes long, ``progress`` is told. Raises
-    OSError where it cannot be written, and :class:`MissingLibraryError`.
+    OSError where it cannot be written, as in place of a device, and :class:`MissingLibraryError`.
     """
+    if path.exists() and not path.is_file():
+        raise OSError(errno.EINVAL, 'it is there and is no file')
     partial = path.with_name(path.name + '.tmp')
     try:
         FORMATS[form](found, partial, progress)
