@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from supervised import HOVER, STOP, Flight
 
+from maglev_controller.bumpless_transfer import model_maps
 from maglev_controller.parameters import ControllerParameters
+from maglev_controller.regulator import Regulator
 from maglev_controller.supervision import Supervisor
 from maglev_model.controller_watch import Status
 from maglev_model.modes import Mode
@@ -59,3 +61,47 @@ def test_a_landing_that_does_not_follow_is_given_up_too() -> None:
     assert set(modes) == {Mode.LANDING, Mode.FAULT}
     assert supervisor.status == Status.GAVE_UP
     assert 'y is 0.00' in supervisor.reason
+
+
+def retune(supervisor: Supervisor, **overrides: object) -> None:
+    regulator = Regulator(build(ControllerParameters, {'observer.bandwidth': 840.0} | overrides))
+    supervisor.adopt(regulator, model_maps(supervisor.regulator.arrays, regulator.arrays))
+
+
+def test_retuning_again_and_again_does_not_hide_that_the_platen_does_not_follow() -> None:
+    supervisor = Supervisor(build(ControllerParameters, {'following.time': 0.01}))
+    flight = Flight(supervisor)
+    flight.step(Phase.REST, STOP, 0.031)
+    flight.step(Phase.TRACK, HOVER, HOVER[0])
+    for _ in range(5):
+        retune(supervisor, **{'following.time': 0.01})
+        for _ in range(4):
+            flight.step(Phase.TRACK, HOVER, HOVER[0] + 0.0015)
+    assert supervisor.status == Status.GAVE_UP
+
+
+def test_after_a_retuning_what_jumped_may_still_overshoot() -> None:
+    supervisor = Supervisor(ControllerParameters())
+    flight = Flight(supervisor)
+    flight.step(Phase.REST, STOP, 0.031)
+    flight.step(Phase.TRACK, HOVER, HOVER[0])
+    jumped = HOVER + 0.02 * (np.arange(5) == 1)
+    for x in (0.0, 0.01, 0.02):
+        flight.step(Phase.TRACK, jumped, HOVER[0], x)
+    retune(supervisor)
+    flight.step(Phase.TRACK, jumped, HOVER[0], 0.02)
+    assert flight.step(Phase.TRACK, jumped, HOVER[0], 0.025) == Mode.REGULATING
+
+
+def test_a_landing_keeps_its_time_to_catch_up_through_a_retuning() -> None:
+    supervisor = Supervisor(ControllerParameters())
+    flight = Flight(supervisor)
+    flight.step(Phase.REST, STOP, 0.031)
+    for _ in range(10):
+        flight.step(Phase.TRACK, HOVER, HOVER[0])
+    supervisor.disable()
+    flight.step(Phase.TRACK, HOVER, HOVER[0])
+    retune(supervisor)
+    flight.step(Phase.TRACK, HOVER, HOVER[0])
+    modes = [flight.step(Phase.TRACK, HOVER, HOVER[0] + 0.0015) for _ in range(100)]
+    assert set(modes) == {Mode.LANDING}

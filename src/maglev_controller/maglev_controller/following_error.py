@@ -55,20 +55,28 @@ class FollowingWatch:
     """Compares the error with what is allowed, once a sample."""
 
     def __init__(self, parameters: ControllerParameters) -> None:
-        table = parameters.following
-        controlled = [axis.controlled for axis in parameters.axes]
-        self._period, self._time = parameters.sample_time, table.time
-        self._arrays = FollowingArrays(
-            period=parameters.sample_time,
-            fading=math.exp(-parameters.sample_time / table.fading),
-            most=np.where(controlled, table.error, math.inf),
-        )
+        self._arrays = FollowingArrays()
+        self._grace = 0.0
+        self.tune(parameters)
         self.reset()
+
+    def tune(self, parameters: ControllerParameters) -> None:
+        """Go by other parameters from now on, without forgetting jumps, nor errors so far."""
+        table, period = parameters.following, parameters.sample_time
+        controlled = [axis.controlled for axis in parameters.axes]
+        arrays, self._time = self._arrays, table.time
+        arrays.period, arrays.fading = period, math.exp(-period / table.fading)
+        arrays.most[:] = np.where(controlled, table.error, math.inf)
+        self._wait(self._grace)
 
     def reset(self, grace: float = 0.0) -> None:
         """Begin anew: the first error is no fault, nor a larger one for less than ``grace`` [s]."""
         self._arrays.begun, self._arrays.beyond = False, 0
-        self._arrays.patience = round(max(self._time, grace) / self._period)
+        self._wait(grace)
+
+    def _wait(self, grace: float) -> None:
+        self._grace = grace
+        self._arrays.patience = round(max(self._time, grace) / self._arrays.period)
 
     def step(self, position: FloatArray, velocity: FloatArray, error: FloatArray) -> str:
         """Take a sample: the reference's position and velocity, and the error, each (5,).

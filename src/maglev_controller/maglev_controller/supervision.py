@@ -112,7 +112,7 @@ class Supervisor:
             if self.learning is not None:
                 self.learning = self.learning.redesigned(regulator.parameters)
         self.regulator, self.parameters = regulator, regulator.parameters
-        self._following_watch = FollowingWatch(regulator.parameters)
+        self._following_watch.tune(regulator.parameters)
         self._reach = ReferenceReach(regulator.parameters)
         self._lower_stop = regulator.parameters.machine.gap_max
         self._hurry()
