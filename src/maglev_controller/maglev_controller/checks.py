@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 from maglev_controller.parameters import ControllerParameters
+from maglev_controller.voltage import USED
+from maglev_model.machine import machine_constants
+from maglev_model.motor import attraction_coefficients
 from maglev_model.parameters import ParameterError
 
 
@@ -22,6 +27,23 @@ def check_machine(parameters: ControllerParameters) -> None:
             f"parameter 'inverse' is '{parameters.inverse}', a machine with a single motor has "
             "'exact' only"
         )
+
+
+def check_currents(parameters: ControllerParameters) -> None:
+    """Refuse currents that cannot hold the platen off the upper stop: the magnets would have it."""
+    machine = machine_constants(parameters.machine)
+    pull, per_ampere, _ = attraction_coefficients(machine, parameters.machine.gap_min)
+    least = (pull - math.sqrt(machine.M_y * machine.G / machine.motors)) / per_ampere
+    voltage = least * parameters.winding.resistance / USED
+    for name, given, bound, unit in (
+        ('limits.current', parameters.limits.current, least, 'A'),
+        ('winding.voltage', parameters.winding.voltage or math.inf, voltage, 'V'),
+    ):
+        if given < bound:
+            raise ParameterError(
+                f"parameter '{name}' is {given:g} {unit}, but to hold the platen off the upper stop"
+                f' it must be at least {bound:.6g} {unit}'
+            )
 
 
 def check_inverse(parameters: ControllerParameters, *, linear: bool) -> None:

@@ -16,6 +16,7 @@ from maglev_controller.design.margins import loop_margins
 from maglev_controller.laws import control_law, find_law, law_names
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
+from maglev_controller.voltage import USED
 from maglev_model.axes import AXES
 from maglev_model.equilibrium import equilibrium_current, equilibrium_inverse, stiffness
 from maglev_model.inverse import Answer, CurrentLimits
@@ -247,6 +248,19 @@ def test_a_single_motor_has_the_exact_inverse_only() -> None:
     assert Regulator(single).parameters.machine.motors == 1
     with pytest.raises(ParameterError, match=r"'simplified'.*single motor has 'exact' only"):
         Regulator(replace(single, {'inverse': 'simplified'}))
+
+
+def test_currents_that_the_magnets_overcome_are_refused() -> None:
+    """From the gap on at which they cannot hold the platen any more it would strike the stop."""
+    least = equilibrium_current(MACHINE, MachineParameters().gap_min)
+    volts = least * ControllerParameters().winding.resistance / USED
+    for name, bound in (('limits.current', least), ('winding.voltage', volts)):
+        Regulator(build(ControllerParameters, {name: 1.001 * bound}))
+        with pytest.raises(ParameterError, match=f"'{name}' is .* at least {bound:.6g} [AV]"):
+            Regulator(build(ControllerParameters, {name: 0.999 * bound}))
+    single = from_yaml(ControllerParameters, 'controller', PARAMS / 'single_motor.yaml')
+    with pytest.raises(ParameterError, match='upper stop'):
+        Regulator(replace(single, {'limits.current': 0.999 * least}))
 
 
 def test_the_bandwidth_is_that_of_the_default_regulator() -> None:

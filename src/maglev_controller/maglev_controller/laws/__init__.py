@@ -28,7 +28,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 
-from maglev_controller.checks import check_foreign, check_learning, check_machine
+from maglev_controller.checks import check_currents, check_foreign, check_learning, check_machine
 from maglev_controller.design.axis_design import AxisDesign
 from maglev_controller.foreign_law import Law
 from maglev_controller.parameters import ControllerParameters
@@ -82,6 +82,7 @@ def control_law(parameters: ControllerParameters) -> ControlLaw:
     """
     law = find_law(parameters.law)
     check_machine(parameters)
+    check_currents(parameters)
     check_learning(parameters)
     law.check(parameters)
     if law.make is not None:
