@@ -41,6 +41,11 @@ def allowed(node: str, kind: str) -> set[str]:
     }
 
 
+def everything(node: str) -> set[str]:
+    kinds = ('publish', 'subscribe', 'reply', 'request')
+    return set().union(*(allowed(node, kind) for kind in kinds))
+
+
 @pytest.mark.parametrize('node', NODES)
 def test_a_node_may_do_what_its_interface_says(node: str) -> None:
     for name, text in NODES[node].interface.items():
@@ -64,13 +69,34 @@ def test_only_the_controller_commands_and_only_operators_call() -> None:
 def test_an_operator_may_call_every_service() -> None:
     for node in ('plant', 'hw_bridge', 'controller', 'reference'):
         for name in allowed(node, 'reply'):
-            assert f'/{node}/{name.removeprefix("~/")}' in allowed('operator', 'request')
+            assert f'{node}/{name.removeprefix("~/")}' in allowed('operator', 'request')
+
+
+def named(kind: str) -> set[str]:
+    """What the nodes' interfaces say is ``published`` or ``subscribed``, in their namespace."""
+    return {
+        name.replace('~', node)
+        for node, described in NODES.items()
+        for name, text in described.interface.items()
+        if text.startswith(kind)
+    }
+
+
+def test_an_operator_hears_what_is_published_and_says_what_nobody_else_does() -> None:
+    assert named('published') <= allowed('operator', 'subscribe')
+    said = set().union(*(allowed(node, 'publish') for node in PROFILES))
+    assert named('subscribed') - said == set()
+
+
+def test_all_but_what_ros_has_once_for_all_moves_with_the_namespace() -> None:
+    absolute = {name for node in PROFILES for name in everything(node) if name.startswith('/')}
+    assert absolute == {'/parameter_events', '/rosout'}
 
 
 def test_the_page_may_call_what_its_buttons_need_and_nothing_else() -> None:
     nodes = {CURRENTS: ('controller',), REFERENCE: ('reference',)}
     needed = {
-        f'/{node}/{call.service}'
+        f'{node}/{call.service}'
         for wish in WISHES.values()
         for call in wish.calls
         for node in nodes.get(call.topic, ('plant', 'hw_bridge'))
