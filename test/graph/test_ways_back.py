@@ -130,6 +130,16 @@ def test_mixed_modes_are_refused(nodes: Nodes, name: str, stage: str) -> None:
     assert other.output.count(said) == 1  # however many measurements had queued up
 
 
+@pytest.mark.parametrize('name', ['controller', 'reference'])
+def test_mixed_sample_times_are_refused(nodes: Nodes, watching: Observer, name: str) -> None:
+    wrong = ('sample_time:=0.0005',)
+    mine, controllers = (wrong, ()) if name == 'reference' else ((), wrong)
+    graph = fly(nodes, 'lift_off.wait:=1.0', *mine, controller=controllers)
+    assert graph[name].wait() == 1
+    assert "samples every 1 ms, this node's 'sample_time' is 0.5 ms" in graph[name].output
+    assert not airborne(watching)
+
+
 def test_nothing_hurries_after_the_end_and_a_dead_controller_is_noticed(
     nodes: Nodes, watching: Observer
 ) -> None:

@@ -20,7 +20,7 @@ from maglev_model.parameters import build, parameter, specs, values
 from maglev_model.phases import Phase
 from maglev_model.wire import KEPT
 from maglev_node.graph_guard import GraphGuard, Watchers
-from maglev_node.mode_check import mode_conflict
+from maglev_node.mode_check import SampleTimeCheck, mode_conflict
 from maglev_node.node import MaglevNode, SourceParameters
 from maglev_node.samples import ProgressWriter, SampleQueue, SampleWriter, hear
 from maglev_node.topics import (
@@ -86,6 +86,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         law, enabled = self._law(self.parameters), self.parameters.enabled
         self.supervisor = Supervisor(law, enabled=enabled, hurried=not self._lockstep)
         self._longest_gap = self.parameters.measurement_timeout / self.parameters.sample_time
+        self._sample_time = SampleTimeCheck(self.parameters.sample_time)
         self._sequence = -1
         self._pending: Any = None  # measurement that waits for its reference
         self._pending_since = self._answered = 0.0
@@ -141,7 +142,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
 
     def _on_measurement(self, message: Any) -> None:
         sequence = message.sequence
-        if self._in_another_mode(message) or self._anothers(message):
+        if self._runs_otherwise(message) or self._anothers(message):
             return
         if self._sequence < 0 and not self._watchers.there(CURRENTS, CONTROLLER_STATE):
             return
@@ -171,13 +172,14 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         if self._pending is None or self._pending.sequence != message.sequence:
             self._pending, self._pending_since = message, time.monotonic()
 
-    def _in_another_mode(self, message: Any) -> bool:
-        """Whether the stage runs in another mode than ours, with which there is no working."""
-        if message.lockstep == self._lockstep:
-            return False
-        if not self.supervisor.flying:  # in flight it is a second one, which will leave
-            self.fail(mode_conflict(self.parameters.mode, message.lockstep))
-        return True
+    def _runs_otherwise(self, message: Any) -> bool:
+        """Whether the stage has another mode or sample time, with which there is no working."""
+        conflict = mode_conflict(self.parameters.mode, message.lockstep)
+        if not self.supervisor.flying:  # in flight it is a second stage, which will leave
+            conflict = conflict or self._sample_time.conflict(message.sequence, message.stamp)
+            if conflict:
+                self.fail(conflict)
+        return bool(conflict)
 
     def _anothers(self, message: Any) -> bool:
         """Whether another controller flies this stage, into which we must not speak.

@@ -1,6 +1,10 @@
-"""Whether stage, controller and reference run in one mode."""
+"""Whether stage, controller and reference run in one mode, and with one sample time."""
 
 from __future__ import annotations
+
+from typing import Final
+
+_ALIKE: Final = 1000  # [ns]
 
 
 def mode_conflict(ours: str, lockstep: bool) -> str:
@@ -16,3 +20,33 @@ def mode_conflict(ours: str, lockstep: bool) -> str:
         f"the stage runs in mode '{stage}', this node in mode '{ours}': start stage, controller and"
         " reference with one 'mode'"
     )
+
+
+class SampleTimeCheck:
+    """Whether the stage keeps our sample time, by the stamps of its samples.
+
+    Currents and references that are meant for other moments do not hold a platen. A stage whose
+    stamps are no steady steps, as a clock's, is believed.
+    """
+
+    def __init__(self, sample_time: float) -> None:
+        """``sample_time`` is ours [s]."""
+        self._ours = 1e9 * sample_time
+        self._sequence = self._stamp = 0
+        self._period = 0.0
+
+    def conflict(self, sequence: int, stamp: int) -> str:
+        """Take a sample and its stamp [ns]; why this node cannot work with the stage, or ''."""
+        samples, elapsed = sequence - self._sequence, stamp - self._stamp
+        if samples == 0:
+            return ''
+        period = elapsed / samples
+        steady = abs(period - self._period) <= _ALIKE  # not with an activation, as time begins anew
+        self._sequence, self._stamp, self._period = sequence, stamp, period
+        if not steady or period <= 0.0 or abs(period - self._ours) <= _ALIKE:
+            return ''
+        return (
+            f"the stage samples every {1e-6 * period:.6g} ms, this node's 'sample_time' is"
+            f' {1e-6 * self._ours:.6g} ms: start stage, controller and reference with one'
+            " 'sample_time'"
+        )

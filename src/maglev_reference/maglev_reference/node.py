@@ -22,7 +22,7 @@ from maglev_model.phases import Phase
 from maglev_model.wire import KEPT
 from maglev_msgs.srv import Step
 from maglev_node.graph_guard import GraphGuard, Watchers
-from maglev_node.mode_check import mode_conflict
+from maglev_node.mode_check import SampleTimeCheck, mode_conflict
 from maglev_node.node import MaglevNode, SourceParameters
 from maglev_node.samples import SampleQueue, SampleWriter
 from maglev_node.topics import (
@@ -115,6 +115,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         self._measurements = SampleQueue(self, STAGE_PROGRESS, sample_qos(1))
         self._states = SampleQueue(self, CONTROLLER_PROGRESS, sample_qos(1))
         self._lockstep = self.parameters.mode == 'lockstep'
+        self._sample_time = SampleTimeCheck(self.parameters.sample_time)
         self._measured: Any = None
         self._published = 0.0  # when, last
         self.create_subscription(JointTrajectory, '~/trajectory', self._on_trajectory, 1, raw=True)
@@ -147,8 +148,10 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         return news
 
     def _in_one_mode(self, message: Any) -> bool:
-        """Whether the stage runs in our mode; in flight no other one can come."""
+        """Whether the stage has our mode and sample time; in flight no other one can come."""
         conflict = mode_conflict(self.parameters.mode, message.lockstep)
+        if self._run.grounded:
+            conflict = conflict or self._sample_time.conflict(message.sequence, message.stamp)
         if conflict and self._run.grounded:
             self.fail(conflict)
         return not conflict

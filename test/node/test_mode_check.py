@@ -1,0 +1,33 @@
+"""Whose sample time is taken for another than ours."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import pytest
+
+from maglev_node.mode_check import SampleTimeCheck
+
+BEGUN = 1_700_000_000_000_000_000  # [ns]
+
+
+def said(samples: Iterable[tuple[int, int]]) -> list[str]:
+    check = SampleTimeCheck(1e-3)
+    return [text for sample in samples if (text := check.conflict(*sample))]
+
+
+@pytest.mark.parametrize('every', [1, 16])
+def test_another_sample_time_is_told_also_where_not_each_sample_is_seen(every: int) -> None:
+    samples = [(n, BEGUN + 2_000_000 * n) for n in range(0, 10 * every, every)]
+    assert "samples every 2 ms, this node's 'sample_time' is 1 ms" in said(samples)[0]
+
+
+def test_our_own_is_none_though_time_begins_anew_or_a_sample_comes_twice() -> None:
+    first = [(n, BEGUN + 1_000_000 * n) for n in range(10)]
+    later = [(n, BEGUN + 5_000_000_000 + 1_000_000 * n) for n in range(10, 20)]
+    assert said([*first, first[-1], *later, *first]) == []
+
+
+def test_stamps_of_a_clock_and_none_at_all_are_believed() -> None:
+    assert said((n, BEGUN + 2_000_000 * n + 7_919 * (n % 3) ** 2) for n in range(50)) == []
+    assert said((n, 0) for n in range(50)) == []
