@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+import numpy as np
 import pytest
 
 from maglev_node.mode_check import SampleTimeCheck
@@ -31,3 +32,5 @@ def test_our_own_is_none_though_time_begins_anew_or_a_sample_comes_twice() -> No
 def test_stamps_of_a_clock_and_none_at_all_are_believed() -> None:
     assert said((n, BEGUN + 2_000_000 * n + 7_919 * (n % 3) ** 2) for n in range(50)) == []
     assert said((n, 0) for n in range(50)) == []
+    jitter = np.random.default_rng(1).integers(-40_000, 40_001, 5000)  # two alike now and then
+    assert said((n, BEGUN + 1_000_000 * n + int(late)) for n, late in enumerate(jitter)) == []

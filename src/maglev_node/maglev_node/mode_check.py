@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
-_ALIKE: Final = 1000  # [ns]
+_ALIKE: Final = 1000  # two steps of stamps that differ by no more than this are steady [ns]
+_APART: Final = 0.2  # share of our sample time; what is nearer may be a clock's steps
 
 
 def mode_conflict(ours: str, lockstep: bool) -> str:
@@ -43,7 +44,7 @@ class SampleTimeCheck:
         period = elapsed / samples
         steady = abs(period - self._period) <= _ALIKE  # not with an activation, as time begins anew
         self._sequence, self._stamp, self._period = sequence, stamp, period
-        if not steady or period <= 0.0 or abs(period - self._ours) <= _ALIKE:
+        if not steady or period <= 0.0 or abs(period - self._ours) <= _APART * self._ours:
             return ''
         return (
             f"the stage samples every {1e-6 * period:.6g} ms, this node's 'sample_time' is"
