@@ -40,7 +40,7 @@ def make_folder(out: Path) -> Path:
     return out.resolve()
 
 
-def trouble(out: Path) -> str:
+def why_unwritable(out: Path) -> str:
     """What keeps logs from being written, and so from telling of it; empty for nothing."""
     try:
         _write_block(out / 'log')

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from runner.console import GREEN, complain, say, write
-from runner.folder import make_folder, say_where, trouble
+from runner.folder import make_folder, say_where, why_unwritable
 from runner.graph import START_ORDER, STOP_ORDER, Flight
 from runner.logs import NodeLog
 from runner.overlays import check_overlay
@@ -50,7 +50,7 @@ def fly(flight: Flight, signals: Signals) -> int:
     elif passed:
         say(f'{name}: passed', GREEN)
     else:
-        if why := trouble(flight.out):
+        if why := why_unwritable(flight.out):
             complain(f'{name}: {why}')
         complain(f'{name}: FAILED, see {flight.out}')
     say_where(flight.out)

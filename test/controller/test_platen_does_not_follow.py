@@ -45,17 +45,23 @@ def test_a_platen_that_does_not_follow_is_given_up_when_its_error_is_too_large(
     assert "'following.error'" in supervisor.reason
 
 
+def hovering(**overrides: object) -> tuple[Supervisor, Flight]:
+    """One that regulates, and follows."""
+    supervisor = Supervisor(build(ControllerParameters, overrides))
+    flight = Flight(supervisor)
+    flight.step(Phase.REST, STOP, 0.031)
+    for _ in range(10):
+        flight.step(Phase.TRACK, HOVER, HOVER[0])
+    return supervisor, flight
+
+
 def test_an_axis_that_nobody_controls_need_not_follow() -> None:
     supervisor = Supervisor(build(ControllerParameters, {'theta.controlled': False}))
     assert drifting(supervisor, 4, 0.05, 100) == 0
 
 
 def test_a_landing_that_does_not_follow_is_given_up_too() -> None:
-    supervisor = Supervisor(ControllerParameters())
-    flight = Flight(supervisor)
-    flight.step(Phase.REST, STOP, 0.031)
-    for _ in range(10):
-        flight.step(Phase.TRACK, HOVER, HOVER[0])
+    supervisor, flight = hovering()
     supervisor.disable()
     modes = [flight.step(Phase.TRACK, HOVER, HOVER[0]) for _ in range(1500)]
     assert set(modes) == {Mode.LANDING, Mode.FAULT}
@@ -69,10 +75,7 @@ def retune(supervisor: Supervisor, **overrides: object) -> None:
 
 
 def test_retuning_again_and_again_does_not_hide_that_the_platen_does_not_follow() -> None:
-    supervisor = Supervisor(build(ControllerParameters, {'following.time': 0.01}))
-    flight = Flight(supervisor)
-    flight.step(Phase.REST, STOP, 0.031)
-    flight.step(Phase.TRACK, HOVER, HOVER[0])
+    supervisor, flight = hovering(**{'following.time': 0.01})
     for _ in range(5):
         retune(supervisor, **{'following.time': 0.01})
         for _ in range(4):
@@ -81,10 +84,7 @@ def test_retuning_again_and_again_does_not_hide_that_the_platen_does_not_follow(
 
 
 def test_after_a_retuning_what_jumped_may_still_overshoot() -> None:
-    supervisor = Supervisor(ControllerParameters())
-    flight = Flight(supervisor)
-    flight.step(Phase.REST, STOP, 0.031)
-    flight.step(Phase.TRACK, HOVER, HOVER[0])
+    supervisor, flight = hovering()
     jumped = HOVER + 0.02 * (np.arange(5) == 1)
     for x in (0.0, 0.01, 0.02):
         flight.step(Phase.TRACK, jumped, HOVER[0], x)
@@ -94,11 +94,7 @@ def test_after_a_retuning_what_jumped_may_still_overshoot() -> None:
 
 
 def test_a_landing_keeps_its_time_to_catch_up_through_a_retuning() -> None:
-    supervisor = Supervisor(ControllerParameters())
-    flight = Flight(supervisor)
-    flight.step(Phase.REST, STOP, 0.031)
-    for _ in range(10):
-        flight.step(Phase.TRACK, HOVER, HOVER[0])
+    supervisor, flight = hovering()
     supervisor.disable()
     flight.step(Phase.TRACK, HOVER, HOVER[0])
     retune(supervisor)

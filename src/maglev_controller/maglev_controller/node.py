@@ -20,7 +20,7 @@ from maglev_model.parameters import build, parameter, specs, values
 from maglev_model.phases import Phase
 from maglev_model.wire import KEPT
 from maglev_node.graph_guard import GraphGuard, Watchers
-from maglev_node.mode_check import SampleTimeCheck, mode_conflict
+from maglev_node.mode_check import StageCheck
 from maglev_node.node import MaglevNode, SourceParameters
 from maglev_node.samples import ProgressWriter, SampleQueue, SampleWriter, hear
 from maglev_node.topics import (
@@ -86,7 +86,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         law, enabled = self._law(self.parameters), self.parameters.enabled
         self.supervisor = Supervisor(law, enabled=enabled, hurried=not self._lockstep)
         self._longest_gap = self.parameters.measurement_timeout / self.parameters.sample_time
-        self._sample_time = SampleTimeCheck(self.parameters.sample_time)
+        self._stage_check = StageCheck(self.parameters.mode, self.parameters.sample_time)
         self._sequence = -1
         self._pending: Any = None  # measurement that waits for its reference
         self._pending_since = self._answered = 0.0
@@ -150,7 +150,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
             self._currents.publish()
             return
         if sequence < self._sequence:
-            if self.supervisor.flying and not self._unheard():
+            if self.supervisor.flying and not self._stage_is_silent():
                 return  # of a second stage, which will find the first and leave
             self.get_logger().warning('the stage began anew')
             self.supervisor.restart()
@@ -174,11 +174,11 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
 
     def _runs_otherwise(self, message: Any) -> bool:
         """Whether the stage has another mode or sample time, with which there is no working."""
-        conflict = mode_conflict(self.parameters.mode, message.lockstep)
-        if not self.supervisor.flying:  # in flight it is a second stage, which will leave
-            conflict = conflict or self._sample_time.conflict(message.sequence, message.stamp)
-            if conflict:
-                self.fail(conflict)
+        if self.supervisor.flying:  # then it is a second stage, which will leave
+            return bool(message.lockstep != self._lockstep)
+        conflict = self._stage_check.conflict(message)
+        if conflict:
+            self.fail(conflict)
         return bool(conflict)
 
     def _anothers(self, message: Any) -> bool:
@@ -196,8 +196,8 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
 
     def _awaits_reference(self, sequence: int) -> bool:
         """Whether an answer waits; without current only so that the loop sleeps, see _watch."""
-        landing = self.supervisor.mode == Mode.LANDING
-        return not landing and self.supervisor.references.find(sequence) < 0
+        known = self.supervisor.references.find(sequence) >= 0
+        return not known and self.supervisor.mode != Mode.LANDING
 
     def _answer(self, message: Any) -> None:
         self._pending = None
@@ -267,9 +267,9 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         if self.supervisor.flying and self.supervisor.mode != Mode.LANDING:
             self.supervisor.disable()
             self._answer_pending()
-        return not self.supervisor.flying or self._unheard()
+        return not self.supervisor.flying or self._stage_is_silent()
 
-    def _unheard(self) -> bool:
+    def _stage_is_silent(self) -> bool:
         return time.monotonic() - self._answered > _SILENCE[self.parameters.mode]
 
     def _on_enable(self, request: Any, response: Any) -> Any:
@@ -367,7 +367,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         failed = supervisor.mode in (Mode.FAULT, Mode.LANDING) or 'landed' in supervisor.reason
         if failed and 'disabled' not in supervisor.reason:
             return DiagnosticStatus.ERROR, f'{supervisor.mode.name}: {supervisor.reason}', facts
-        if self._pending is None and self._sequence > 0 and self._unheard():
+        if self._pending is None and self._sequence > 0 and self._stage_is_silent():
             text = f'no measurement for {time.monotonic() - self._answered:.1f} s'
             return DiagnosticStatus.WARN, text, facts
         return DiagnosticStatus.OK, supervisor.reason or supervisor.mode.name.lower(), facts
@@ -388,7 +388,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         if self.supervisor.mode == Mode.REGULATING:
             self.supervisor.disable()
         self._answered = time.monotonic()  # from now on it has its time
-        while self.supervisor.flying and not self._unheard():
+        while self.supervisor.flying and not self._stage_is_silent():
             self._answer_pending()
             self._serve_by_hand()
             time.sleep(_HAND_PERIOD)

@@ -7,12 +7,12 @@ import math
 from collections.abc import Callable
 
 
-def whole_number(least: int, most: int | None = None) -> Callable[[str], int]:
-    """A ``type`` for a whole number of at least ``least`` and, if given, at most ``most``."""
-    bounds = f'of at least {least}' if most is None else f'from {least} to {most}'
+def whole_number(least: int, most: float = math.inf) -> Callable[[str], int]:
+    """A ``type`` for a whole number from ``least`` to ``most``."""
+    bounds = f'of at least {least}' if most == math.inf else f'from {least} to {most}'
 
     def check(text: str) -> int:
-        if not text.isdecimal() or not least <= int(text) <= (int(text) if most is None else most):
+        if not text.isdecimal() or not least <= int(text) <= most:
             raise argparse.ArgumentTypeError(f"'{text}' is no whole number {bounds}")
         return int(text)
 

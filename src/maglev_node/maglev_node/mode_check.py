@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 _ALIKE: Final = 1000  # two steps of stamps that differ by no more than this are steady [ns]
 _APART: Final = 0.2  # share of our sample time; what is nearer may be a clock's steps
@@ -50,4 +50,18 @@ class SampleTimeCheck:
             f"the stage samples every {1e-6 * period:.6g} ms, this node's 'sample_time' is"
             f' {1e-6 * self._ours:.6g} ms: start stage, controller and reference with one'
             " 'sample_time'"
+        )
+
+
+class StageCheck:
+    """Whether a node and the stage that it measures by can work together."""
+
+    def __init__(self, mode: str, sample_time: float) -> None:
+        """``mode`` and ``sample_time`` [s] are the node's."""
+        self._mode, self._sample_time = mode, SampleTimeCheck(sample_time)
+
+    def conflict(self, measurement: Any) -> str:
+        """Take a measurement; why they cannot, or ''."""
+        return mode_conflict(self._mode, measurement.lockstep) or self._sample_time.conflict(
+            measurement.sequence, measurement.stamp
         )

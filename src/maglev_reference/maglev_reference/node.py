@@ -22,7 +22,7 @@ from maglev_model.phases import Phase
 from maglev_model.wire import KEPT
 from maglev_msgs.srv import Step
 from maglev_node.graph_guard import GraphGuard, Watchers
-from maglev_node.mode_check import SampleTimeCheck, mode_conflict
+from maglev_node.mode_check import StageCheck
 from maglev_node.node import MaglevNode, SourceParameters
 from maglev_node.samples import SampleQueue, SampleWriter
 from maglev_node.topics import (
@@ -115,7 +115,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         self._measurements = SampleQueue(self, STAGE_PROGRESS, sample_qos(1))
         self._states = SampleQueue(self, CONTROLLER_PROGRESS, sample_qos(1))
         self._lockstep = self.parameters.mode == 'lockstep'
-        self._sample_time = SampleTimeCheck(self.parameters.sample_time)
+        self._stage_check = StageCheck(self.parameters.mode, self.parameters.sample_time)
         self._measured: Any = None
         self._published = 0.0  # when, last
         self.create_subscription(JointTrajectory, '~/trajectory', self._on_trajectory, 1, raw=True)
@@ -143,16 +143,16 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         """Take the newest measurement; false when there is none, or one to be left alone."""
         news = False
         for message in self._measurements.take(1):
-            if self._run.observe(message.sequence) and self._in_one_mode(message):
+            if self._run.observe(message.sequence) and self._runs_alike(message):
                 news, self._measured, self._seen = True, message, time.monotonic()
         return news
 
-    def _in_one_mode(self, message: Any) -> bool:
+    def _runs_alike(self, message: Any) -> bool:
         """Whether the stage has our mode and sample time; in flight no other one can come."""
-        conflict = mode_conflict(self.parameters.mode, message.lockstep)
-        if self._run.grounded:
-            conflict = conflict or self._sample_time.conflict(message.sequence, message.stamp)
-        if conflict and self._run.grounded:
+        if not self._run.grounded:
+            return bool(message.lockstep == self._lockstep)
+        conflict = self._stage_check.conflict(message)
+        if conflict:
             self.fail(conflict)
         return not conflict
 

@@ -102,14 +102,12 @@ def fly(
     here by name wins over them, ``plant={'encoder.gap_noise': 1e-6}``; a whole table is taken as it
     is, and ``files`` do not change it. The reference has the controller's
     ``internal_model.fundamental``, which trajectories without a frequency of their own follow.
-    ``law``, an object as in docs/extending.md, answers in place
-    of the controller's own.
+    ``law``, an object as in docs/extending.md, answers in place of the controller's own.
 
     Raises ParameterError naming what is wrong with a parameter or out of the reference's reach, and
     MeasurementFault when the regulator gives the platen up, LawFault when a law of your own fails,
     TypeError for a trajectory that is no name.
     """
-    files = (files,) if isinstance(files, str | Path) else files
     followed: dict[str, object] = {}
     if not isinstance(trajectory, str | None):
         raise TypeError(
@@ -149,7 +147,10 @@ def fly(
 
 
 def _table(
-    cls: type[T], node: str, files: Sequence[str | Path], given: T | Mapping[str, object] | None
+    cls: type[T],
+    node: str,
+    files: Sequence[str | Path] | str | Path,
+    given: T | Mapping[str, object] | None,
 ) -> T:
     if isinstance(given, cls):
         return given
@@ -158,4 +159,5 @@ def _table(
             f"'{node}' is a {type(given).__name__}, it takes {cls.__name__}, or a dict of its "
             'parameters by name'
         )
-    return replace(from_yaml(cls, node, *files), given or {})
+    paths = (files,) if isinstance(files, str | Path) else files
+    return replace(from_yaml(cls, node, *paths), given or {})
