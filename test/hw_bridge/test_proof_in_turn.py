@@ -63,7 +63,6 @@ def test_every_step_has_its_turn() -> None:
         Act.LOADS,
         *(Act.RELEASE, Act.PRESS, Act.RELEASE, Act.UNPLUG, Act.PLUG),
         *(Act.PRESS, Act.RELEASE),
-        Act.MOTORS,
     ]
     assert [phase for phase, _ in person.currents] == [*SHOWN] * 4
     enabled, *others = np.array([current for _, current in person.currents]).reshape(4, 2)

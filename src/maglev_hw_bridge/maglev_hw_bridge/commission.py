@@ -25,6 +25,7 @@ from maglev_hw_bridge.doubts import doubts
 from maglev_hw_bridge.drivers import Driver, DriverError, make_driver
 from maglev_hw_bridge.drivers.emulated import EmulatedDriver
 from maglev_hw_bridge.encoders import Encoders, HomingError
+from maglev_hw_bridge.gains import measured_current, prove_gains
 from maglev_hw_bridge.lift import Lift
 from maglev_hw_bridge.memory import Memory
 from maglev_hw_bridge.operators import Act, EmulatedPerson, Operator, Person, StoppedError
@@ -90,6 +91,7 @@ class Commissioning:
             self._boards()
             self._keep(active=True)
             self._last_line()
+            self._gains()
             self._homing()
             self._scales()
             self._phases()
@@ -156,6 +158,16 @@ class Commissioning:
                 self._parameters, self._driver, self._amplifiers, self._operator, self._tell
             ).run()
         self._memory.record_proof(self._parameters)
+
+    def _gains(self) -> None:
+        self._ask(
+            f'measure {measured_current(self._parameters):g} A through each load in turn, and what '
+            'is left when none is commanded'
+        )
+        with self._current():
+            prove_gains(self._parameters, self._driver, self._amplifiers, self._operator)
+        self._operator.act(Act.MOTORS)
+        self._tell('  every amplifier makes of a volt what it is believed to')
 
     def _homing(self) -> None:
         home = self._parameters.homing

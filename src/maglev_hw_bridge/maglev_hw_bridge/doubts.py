@@ -6,7 +6,7 @@ from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.signal_parameters import PHASE_NAMES
 from maglev_model.axes import AXES
 
-_LEFT_CURRENT = 0.02
+LEFT_CURRENT = 0.02
 """Share of the continuous current that is worth a word when the watchdog leaves it flowing."""
 
 
@@ -37,7 +37,7 @@ def _left_flowing(parameters: BridgeParameters) -> list[str]:
         return []
     left = [abs(g * v) for g, v in zip(amplifier.gain, amplifier.offset, strict=True)]
     worst = max(range(len(left)), key=left.__getitem__)
-    if left[worst] <= _LEFT_CURRENT * amplifier.continuous_current:
+    if left[worst] <= LEFT_CURRENT * amplifier.continuous_current:
         return []
     return [
         f"parameter 'amplifier.offset[{worst}]' is {amplifier.offset[worst]:g} V: when the watchdog"

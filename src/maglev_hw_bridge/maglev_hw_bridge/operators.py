@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import enum
+import math
 import select
 import sys
 import termios
@@ -29,7 +31,7 @@ class Act(enum.Enum):
         'disconnect the motors and connect dummy loads instead, of which those named above show '
         'their current (a lamp, a meter)'
     )
-    MOTORS = 'disconnect the loads and connect the motors again'
+    MOTORS = 'disconnect loads and ammeter and connect the motors again'
     PRESS = 'press the emergency stop'
     RELEASE = 'release the emergency stop'
     UNPLUG = "pull the plug of the emergency stop's wire, as if it were broken"
@@ -69,6 +71,14 @@ class Operator(Protocol):
         """
         ...
 
+    def connect_meter(self, phase: int) -> None:
+        """Return when an ammeter shows what the load of a phase (0 to 11) carries."""
+        ...
+
+    def reads_current(self, phase: int, meanwhile: Meanwhile) -> float:
+        """What that ammeter shows now [A]; ``meanwhile`` as in :meth:`sees_current`."""
+        ...
+
     def sees_enabled(self) -> bool:
         """Whether the amplifiers show that they are enabled now."""
         ...
@@ -106,6 +116,14 @@ class Person:
         """See the protocol."""
         return _seen(f'does the load at {PHASE_NAMES[phase]} carry current now?', meanwhile)
 
+    def connect_meter(self, phase: int) -> None:
+        """See the protocol."""
+        _answer(f'  connect the ammeter to the load at {PHASE_NAMES[phase]}, then press Enter: ')
+
+    def reads_current(self, phase: int, meanwhile: Meanwhile) -> float:
+        """See the protocol."""
+        return _number(f'what does the ammeter at {PHASE_NAMES[phase]} show [A]?', meanwhile)
+
     def sees_enabled(self) -> bool:
         """See the protocol."""
         return _seen('do the amplifiers show that they are enabled now?')
@@ -123,6 +141,15 @@ def _seen(question: str, meanwhile: Meanwhile | None = None) -> bool:
     while answer not in ('y', 'yes', 'n', 'no'):
         answer = _answer(f'  {question} [y/n] ', meanwhile).strip().lower()
     return answer in ('y', 'yes')
+
+
+def _number(question: str, meanwhile: Meanwhile) -> float:
+    """The answer, asked for until it is a finite number."""
+    number = math.nan
+    while not math.isfinite(number):
+        with contextlib.suppress(ValueError):
+            number = float(_answer(f'  {question} ', meanwhile))
+    return number
 
 
 def _agreed(question: str) -> bool:
@@ -187,12 +214,24 @@ class EmulatedPerson:
 
     def sees_current(self, phase: int, meanwhile: Meanwhile | None = None) -> bool:
         """See the protocol."""
+        self._look(meanwhile)
+        return bool(np.abs(self._boards.rig.phase_current[phase]) > _A_CURRENT)
+
+    def _look(self, meanwhile: Meanwhile | None) -> None:
+        """Take the time it takes to answer."""
         if meanwhile is None:
             self.wait(self._response)
         else:
             for _ in range(round(self._response / self._boards.period)):
                 meanwhile()
-        return bool(np.abs(self._boards.rig.phase_current[phase]) > _A_CURRENT)
+
+    def connect_meter(self, phase: int) -> None:
+        """See the protocol."""
+
+    def reads_current(self, phase: int, meanwhile: Meanwhile) -> float:
+        """See the protocol."""
+        self._look(meanwhile)
+        return float(self._boards.rig.phase_current[phase])
 
     def sees_enabled(self) -> bool:
         """See the protocol."""

@@ -34,7 +34,7 @@ def refuse_pressed(driver: SampledDriver) -> None:
 
 
 class Proof:
-    """The steps, on boards that are open; they are left open, with no current."""
+    """The steps, on boards that are open; they are left open, with no current, the loads on."""
 
     def __init__(
         self,
@@ -66,7 +66,6 @@ class Proof:
         self._watchdog()
         if self._boards.stop_input >= 0:
             self._emergency_stop()
-        self._operator.act(Act.MOTORS)
 
     # -- stop input --------------------------------------------------------------------------------
 
