@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+import time
+
 import pytest
 
 from maglev_hw_bridge.parameters import BridgeParameters
@@ -30,3 +35,20 @@ def test_a_false_alarm_breaks_a_rule(
     assert rule == 5
     assert 'though nothing had failed' in text
     assert said in text or phase != 'hover'
+
+
+def test_a_run_that_others_keep_from_the_processor_does_not_hang(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(train, '_PATIENCE', 1.0)
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(before)})
+    busy = [subprocess.Popen([sys.executable, '-c', 'while True: pass']) for _ in range(5)]
+    try:
+        used = train._branch(lambda: next(t for t in iter(time.process_time, None) if t > 0.4))
+    finally:
+        os.sched_setaffinity(0, before)
+        for one in busy:
+            one.kill()
+            one.wait()
+    assert used == pytest.approx(0.4, abs=0.2)
