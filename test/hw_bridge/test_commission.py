@@ -22,7 +22,7 @@ from maglev_hw_bridge.memory import Memory
 from maglev_hw_bridge.operators import EmulatedPerson, StoppedError
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.proof import WrongError
-from maglev_hw_bridge.response import Twins
+from maglev_hw_bridge.response import Twins, rubbing
 from maglev_model.parameters import build
 from maglev_model.stage import Fault
 from maglev_node import realtime
@@ -327,8 +327,9 @@ def test_a_dead_phase_and_a_dead_encoder() -> None:
 
 @pytest.fixture(scope='module')
 def foretold() -> np.ndarray:
-    twins = Twins(build(BridgeParameters, HOME), PEAK)
-    return np.stack([twins.phase(phase, np.zeros(2)) for phase in range(12)], axis=1)
+    twins = Twins(rubbing(build(BridgeParameters, HOME)), PEAK)
+    moved = [twins.phase(phase, np.zeros(2)) for phase in range(12)]
+    return np.stack(moved, axis=1)[..., None, :]
 
 
 def test_every_single_error_is_told_from_every_other(foretold: np.ndarray) -> None:
@@ -345,13 +346,22 @@ def test_two_errors_at_once_are_no_single_one(foretold: np.ndarray) -> None:
     seen = foretold[0].copy()
     for phase in (0, 4, 8, 11):
         seen[phase] = seen[phase, ::-1]
-    seen[:, :, 4] *= -1.0
+    seen[..., 4] *= -1.0
     assert not diagnose(seen, foretold).fine
 
 
-def test_where_the_wiring_may_be_right_other_parameters_are_named() -> None:
-    with pytest.raises(WrongError, match=r'either: .*all is well.*check .*commutation'):
-        commission({'commutation.offset': [0.5, 0.0, 0.0, 0.0]})
+def test_what_looks_alike_is_told_apart_where_it_does_not(foretold: np.ndarray) -> None:
+    alike = foretold.copy()
+    alike[:, 6] = alike[:, 0]
+    finding = diagnose(alike[0], alike)
+    assert (finding.fine, finding.explanations) == (False, 2)
+    assert finding.text.startswith('either: all is well; or: motor 1 phase a and motor 3 phase a')
+    assert finding.text.endswith('check amplifier.*, commutation.* and machine.*')
+    both = np.concatenate([alike, foretold], axis=3)
+    assert diagnose(both[0], both).fine
+    both[:, [0, 6]] = both[:, [6, 0]]
+    finding = diagnose(both[0], np.concatenate([alike, foretold], axis=3))
+    assert finding.text.startswith('motor 1 phase a and motor 3 phase a are exchanged')
 
 
 def test_pulses_are_small(foretold: np.ndarray) -> None:

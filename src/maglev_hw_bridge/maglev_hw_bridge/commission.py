@@ -20,7 +20,6 @@ import numpy as np
 
 from maglev_hw_bridge.amplifiers import Amplifiers
 from maglev_hw_bridge.board import ENDING, unbroken
-from maglev_hw_bridge.diagnosis import diagnose
 from maglev_hw_bridge.doubts import doubts
 from maglev_hw_bridge.drivers import Driver, DriverError, make_driver
 from maglev_hw_bridge.drivers.emulated import EmulatedDriver
@@ -30,10 +29,11 @@ from maglev_hw_bridge.lift import Lift
 from maglev_hw_bridge.memory import Memory
 from maglev_hw_bridge.operators import Act, EmulatedPerson, Operator, Person, StoppedError
 from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.phases import prove_phases
 from maglev_hw_bridge.proof import Proof, WrongError
-from maglev_hw_bridge.response import Pulses, Twins
+from maglev_hw_bridge.response import Pulses
 from maglev_hw_bridge.scales import prove_scales
-from maglev_hw_bridge.signal_parameters import ENCODER_NAMES, PHASE_NAMES, PHASES
+from maglev_hw_bridge.signal_parameters import ENCODER_NAMES, PHASES
 from maglev_hw_bridge.stage import BridgeStage
 from maglev_model.arguments import number
 from maglev_model.axes import FloatArray
@@ -193,36 +193,22 @@ class Commissioning:
 
     def _lengths(self) -> FloatArray:
         """What the encoders read now (6,) [m]."""
-        self._driver.counts(self._counts)
+        self._driver.counts(self._counts)  # and looks at the emergency stop
         return np.array(self._encoders.decode(self._counts))
 
     def _phases(self) -> None:
-        machine = self._parameters.machine
-        self._operator.act(Act.MIDDLE)
-        place = self._lengths()[4:]
-        if np.max(np.abs(place)) > 0.5 * min(machine.x_max, machine.z_max):
-            raise WrongError(
-                f'the encoders have the platen at x = {place[0] * 1e3:.1f} mm, z = '
-                f'{place[1] * 1e3:.1f} mm, too far from the middle: move it, or check encoder '
-                'x and z (resolution, direction, cable)'
-            )
         pulses = Pulses(
             self._parameters, self._driver, self._encoders, self._amplifiers, self._peak
         )
-        twins = Twins(self._parameters, self._peak)
-        seen, foretold = [], []
-        for phase in range(PHASES):
+
+        def pulse(phase: int) -> FloatArray:
             if phase % 3 == 0:
                 self._ask(f'motor {phase // 3 + 1}: up to {self._peak:g} A in each phase alone')
-            foretold.append(twins.phase(phase, pulses.place))
             with self._current():
-                self._driver.counts(self._counts)  # and looks at the emergency stop
-                seen.append(pulses.phase(phase))
-            self._tell(f'  {PHASE_NAMES[phase]}: {_in_words(seen[-1])}')
-        finding = diagnose(np.array(seen), np.stack(foretold, axis=1))
-        if not finding.fine:
-            raise WrongError(finding.text)
-        self._tell(f'  {finding.text}')
+                self._lengths()
+                return pulses.phase(phase)
+
+        prove_phases(self._parameters, self._peak, self._operator, self._lengths, pulse, self._tell)
 
     def _first_lift_off(self) -> None:
         self._ask(
@@ -277,19 +263,6 @@ class Commissioning:
             yield
         finally:
             realtime.give_priority_back()
-
-
-def _in_words(response: FloatArray) -> str:
-    """What one phase's pulses moved."""
-    texts = []
-    for sign, moved in zip('+-', response, strict=True):
-        parts = [
-            f'{name} {move * 1e6:+.0f} um'
-            for name, move in zip(ENCODER_NAMES, moved, strict=True)
-            if abs(move) > 3e-5
-        ]
-        texts.append(f'{sign}: {", ".join(parts) or "nothing moves"}')
-    return '; '.join(texts)
 
 
 def _operator(driver: Driver, yes: bool) -> Operator:

@@ -21,6 +21,7 @@ SHIM = 1e-3
 """By how much shims raise the platen, not so far that it is lifted by its magnets [m]."""
 
 _A_CURRENT = 0.1  # that shows at a load [A]
+_BESIDE = 5e-3  # from what looks alike in opposite motors a quarter of the way to the next [m]
 Meanwhile = Callable[[], None]
 
 
@@ -47,6 +48,8 @@ class Act(enum.Enum):
     MIDDLE = (
         'put the platen near the middle, still on its stop, where it can move 20 mm along X and Z'
     )
+    BESIDE = 'put it some 5 mm beside the middle along X and along Z, still on its stop'
+    BETWEEN = 'put it half as far beside the middle along X and along Z, still on its stop'
 
 
 class Operator(Protocol):
@@ -205,6 +208,8 @@ class EmulatedPerson:
             Act.Z_END: (*position[:2], -machine.z_max),
             Act.Z_OTHER_END: (*position[:2], machine.z_max),
             Act.MIDDLE: (position[0], 0.0, 0.0),
+            Act.BESIDE: (position[0], _BESIDE, _BESIDE),
+            Act.BETWEEN: (position[0], 0.5 * _BESIDE, 0.5 * _BESIDE),
         }[what]
         self._boards.place(position)
 

@@ -9,6 +9,7 @@ explain what was seen instead is found in :mod:`maglev_hw_bridge.diagnosis`.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -98,15 +99,34 @@ class Pulses:
         return np.array(self._encoders.arrays.length[4:])
 
 
-class Twins:
-    """The emulated machine, wired as the parameters claim, with less and more guide friction."""
+def rubbing(parameters: BridgeParameters) -> list[BridgeParameters]:
+    """The same machine with other frictions of its guides, for :class:`Twins`; itself first."""
+    return [_rubbing(parameters, *factors) for factors in _FRICTIONS]
 
-    def __init__(self, parameters: BridgeParameters, peak: float) -> None:
+
+def turned(parameters: BridgeParameters, angles: Iterable[float]) -> list[BridgeParameters]:
+    """The same machine with all motors' electrical angles off by each [rad], for :class:`Twins`."""
+    commutation = parameters.commutation
+    return [
+        dataclasses.replace(
+            parameters,
+            commutation=dataclasses.replace(
+                commutation, offset=tuple(offset + angle for offset in commutation.offset)
+            ),
+        )
+        for angle in angles
+    ]
+
+
+class Twins:
+    """Emulated machines, wired as their parameters claim."""
+
+    def __init__(self, variants: Iterable[BridgeParameters], peak: float) -> None:
         """``peak``: largest phase current [A]."""
-        self._twins = [_Twin(_rubbing(parameters, *factors), peak) for factors in _FRICTIONS]
+        self._twins = [_Twin(variant, peak) for variant in variants]
 
     def phase(self, phase: int, place: FloatArray) -> FloatArray:
-        """What the encoders should see of one phase, (5, 2, 6) [m], from ``place``: x, z [m]."""
+        """What each one's encoders should see of a phase, (n, 2, 6) [m], from x, z [m]."""
         return np.array([twin.phase(phase, place) for twin in self._twins])
 
 
