@@ -22,7 +22,7 @@ from maglev_hw_bridge.stage import BridgeStage
 from maglev_model.axes import FloatArray
 from maglev_model.controller_watch import ControllerWatch, Verdict
 from maglev_model.parameters import build
-from maglev_model.stage import EncoderSample, StageError
+from maglev_model.stage import EncoderSample, Fault, StageError
 from maglev_study.faults.programme import RESET, STOP, Programme
 from maglev_study.faults.world import World
 
@@ -295,6 +295,7 @@ class Flight:
         self.acting = True  # the operator goes on with the programme
         self.skip_homing = False
         self.forbidden = ''  # why the amplifiers must not be enabled
+        self.asked: Fault | None = None  # the bridge's, by the programme's own emergency stop
         self.each: Callable[[], None] | None = None  # before each sample
 
     def step(self) -> None:
@@ -329,6 +330,7 @@ class Flight:
         supervisor = self.controller.supervisor
         if action == STOP:
             self.bridge.emergency_stop()
+            self.asked = self.bridge.stage.fault
             supervisor.disable()
         elif action == RESET:
             self.bridge.reset()

@@ -61,7 +61,6 @@ class Judge:
         self.seen: int | None = None  # tick of the new fault, or of a refusal
         self.latched = 0  # ticks until which the prior fault stayed latched
         self.reason = ''
-        self.cut_by_itself = False
         self.ended: int | None = None  # tick of the terminal state
         self.released: int | None = None  # tick of the end of the process
         self.problems: list[tuple[int, str]] = []
@@ -100,11 +99,11 @@ class Judge:
     def look(self) -> None:
         """Look at the fault, once a sample."""
         fault = self.flight.bridge.stage.fault
+        self.prior = self.prior or self.flight.asked
         if self.prior is not None and fault is self.prior:
             self.latched = self._n
         if self.seen is None and fault is not None and fault is not self.prior:
             self.notice(fault.reason)
-            self.cut_by_itself = fault.cut
 
     def on_course(self, wanted: FloatArray) -> None:
         """The platen should be near ``wanted`` (5,) [m, rad], once it has left the stop."""
