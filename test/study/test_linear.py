@@ -72,9 +72,11 @@ def test_the_open_loop_moves_as_the_simulator_does(bandwidth: float) -> None:
     np.testing.assert_allclose(found[:10], moved, rtol=2e-3, atol=2e-3 * np.abs(moved).max())
 
 
-def test_currents_of_the_hover_hold_it() -> None:
-    system = nonlinear_plant(stage_of(guide__viscous=(0.3,) * 5))
-    currents = hover_currents(stage_of(), AT)
+@pytest.mark.parametrize('off', [{}, {'offset__K_v1': 1.1, 'offset__mass_y': 1.2}])
+def test_currents_of_the_hover_hold_it(off: dict[str, float]) -> None:
+    """Of a machine whose K's fit each other no more, too."""
+    system = nonlinear_plant(stage_of(guide__viscous=(0.3,) * 5, **off))
+    currents = hover_currents(stage_of(**off), AT)
     state = np.concatenate((np.stack((AT, np.zeros(5)), axis=1).ravel(), currents))
     np.testing.assert_allclose(system.dynamics(0.0, state, currents), 0.0, atol=1e-10)
 
@@ -149,6 +151,21 @@ def test_each_closed_loop_answers_as_the_simulator_does(
         compare(stepped, response(loop[axis, 'reference'], 1e-6))
 
 
+def test_an_axis_is_as_stiff_as_its_currents_make_it() -> None:
+    """Of a platen that stoppers carry they are others than those that would."""
+    place = np.array([0.028, 0.0, 0.0, 0.0, 0.012])
+    given = stage_of(initial__position=tuple(place), guide__locked=(True,) * 4 + (False,))
+    law = build(
+        ControllerParameters,
+        {**LINEAR, 'theta.bandwidth': 100.0, 'theta.integration': 30.0}
+        | {f'{axis}.controlled': False for axis in AXES[:4]},
+    )
+    push = np.array([0.0, 0.0, 0.0, 0.0, 2e-4])
+    pushed = Hover(given, law, place).moved(push, np.zeros(5))[:, 4]
+    loop = linearise(given, place, axis='theta', controller=law)
+    compare(pushed, response(loop['error', 'disturbance'], 2e-4))
+
+
 def response(system: Any, step: float) -> np.ndarray:
     """The output of a sampled system."""
     time = PERIOD * np.arange(COUNT)
@@ -163,10 +180,12 @@ def compare(found: np.ndarray, wanted: np.ndarray) -> None:
 class Hover:
     """A flight that hovers, and can be pushed again and again."""
 
-    def __init__(self, given: PlantParameters, law: ControllerParameters) -> None:
-        self.stage, self.regulator = SimulatedStage(given), Regulator(law)
+    def __init__(
+        self, given: PlantParameters, law: ControllerParameters, place: np.ndarray = HOVER
+    ) -> None:
+        self.stage, self.regulator, self.place = SimulatedStage(given), Regulator(law), place
         self.delayed = law.input_delay > 0
-        run(self.regulator, self.stage, held(HOVER, 0.7, PERIOD), delayed=self.delayed)
+        run(self.regulator, self.stage, held(place, 0.7, PERIOD), delayed=self.delayed)
         self.saved = self.stage.arrays.block.copy(), self.regulator.save()
         self.still = self.go_on(np.zeros(5), np.zeros(5))
 
@@ -175,7 +194,7 @@ class Hover:
         self.stage.arrays.block[:] = self.saved[0]
         self.regulator.restore(self.saved[1])
         self.stage.arrays.constant[:] += push
-        references = held(HOVER + way, PERIOD * COUNT, PERIOD)
+        references = held(self.place + way, PERIOD * COUNT, PERIOD)
         return run(self.regulator, self.stage, references, delayed=self.delayed).output
 
     def moved(self, push: np.ndarray, way: np.ndarray) -> np.ndarray:

@@ -21,9 +21,11 @@ from maglev_model.axes import AXES, FloatArray
 from maglev_model.compiled import compiled
 from maglev_model.currents import exact_currents
 from maglev_model.inverse import NO_LIMITS
+from maglev_model.machine import Machine
 from maglev_model.machine_array import machine_from_array
 from maglev_model.optional import needed
 from maglev_model.parameters import ParameterError
+from maglev_model.platen import output_accelerations
 from maglev_model.records import Block
 from maglev_plant.arrays import StageArrays, stage_arrays, true_machine
 from maglev_plant.dynamics import derivative
@@ -40,6 +42,7 @@ CURRENTS = tuple(f'i_{way}{motor}' for way in 'dq' for motor in (1, 2, 3, 4))
 
 _STEP = 1e-6  # of central differences: [m, rad], [m/s, rad/s], [A], [m/s², rad/s²]
 _NEWTON = 20
+_HELD = 1e-6  # acceleration of what is held, at most [m/s², rad/s²]
 
 
 @compiled
@@ -68,12 +71,23 @@ class StageAt:
         self.position = positions('at', at, parameters.machine)
         self.state = np.zeros(10)
         self.state[::2], self.state[1::2] = self.position, speed
-        i_d, i_q, possible = exact_currents(
-            true_machine(parameters), self.position[None], -self.arrays.constant[None]
-        )
-        if not possible[0]:
+        self.current = self._holding(true_machine(parameters))
+
+    def _holding(self, machine: Machine) -> FloatArray:
+        """The currents (8,): those of the exact inverse, put right where K's are off Table I's."""
+        wanted, (y, _, _, phi, theta) = -self.arrays.constant, self.position
+        i_d, i_q, _ = exact_currents(machine, self.position[None], wanted[None])
+        found: FloatArray = np.concatenate((i_d[0], i_q[0]))
+
+        def missing(current: FloatArray) -> FloatArray:
+            made = output_accelerations(machine, y, phi, theta, current[:4], current[4:])
+            return np.where(self.arrays.locked, 0.0, wanted - made)
+
+        for _ in range(_NEWTON):
+            found -= np.linalg.lstsq(slopes(missing, found), missing(found), rcond=None)[0]
+        if not np.max(np.abs(missing(found))) < _HELD:
             raise ParameterError(f"no currents hold the platen 'at' {self.position.tolist()}")
-        self.current: FloatArray = np.concatenate((i_d[0], i_q[0]))
+        return found
 
     def rates(self, time: float, state: FloatArray, current: FloatArray) -> FloatArray:
         """Rate of change of x1..x10 (10,) with currents that flow (8,)."""
@@ -212,9 +226,10 @@ def _axis_loop(
     if not controller.axes[index].controlled:
         raise ParameterError(f"parameter '{axis}.controlled' is false: there is no such loop")
     law = linear_law(given, controller)
-    sampled, driven = _sampled_axis(stage, controller.sample_time, index)
     inverse = inverse_slopes(stage, controller)
-    row = stage.slopes(inverse.flowing)[1][2 * index + 1]
+    by_state, by_current = stage.slopes(inverse.flowing)
+    own, row = by_state[2 * index + 1, 2 * index : 2 * index + 2], by_current[2 * index + 1]
+    sampled, driven = _sampled_axis(own, stage.lag, controller.sample_time)
     stiffness, gain = float(row @ inverse.by_output[:, index]), float(row @ inverse.by_w[:, index])
     return _closed(
         law.design(controller, axis), controller, (sampled, driven), (stiffness, gain), axis
@@ -236,17 +251,16 @@ def linear_law(given: PlantParameters, controller: ControllerParameters) -> Cont
     return law
 
 
-def _sampled_axis(stage: StageAt, period: float, index: int) -> tuple[FloatArray, FloatArray]:
+def _sampled_axis(row: FloatArray, lag: float, period: float) -> tuple[FloatArray, FloatArray]:
     """An axis between two samples: position, rate and, with a lag, the acceleration that flows.
 
-    Driven by the acceleration that the currents are to make, and by a disturbance.
+    Driven by the acceleration that the currents are to make, and by a disturbance; ``row`` (2,) is
+    the slope of its acceleration by position and rate, ``lag`` the currents' [rad/s], 0 for none.
     """
-    by_state, _ = stage.slopes()
-    row = by_state[2 * index + 1, 2 * index : 2 * index + 2]
-    if not stage.lag:
+    if not lag:
         return discretise(np.array([[0.0, 1.0], row]), np.array([[0.0, 0.0], [1.0, 1.0]]), period)
-    state = np.array([[0.0, 1.0, 0.0], [*row, 1.0], [0.0, 0.0, -stage.lag]])
-    return discretise(state, np.array([[0.0, 0.0], [0.0, 1.0], [stage.lag, 0.0]]), period)
+    state = np.array([[0.0, 1.0, 0.0], [*row, 1.0], [0.0, 0.0, -lag]])
+    return discretise(state, np.array([[0.0, 0.0], [0.0, 1.0], [lag, 0.0]]), period)
 
 
 class InverseSlopes(NamedTuple):
