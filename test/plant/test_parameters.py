@@ -64,6 +64,7 @@ def test_ideal_has_no_friction_counts_or_lag() -> None:
         ('initial.position', (0.031, 0.0, 0.0, 0.0, 0.01), 'initial.position.*vertical stop'),
         ('guide.coulomb_velocity', (1e-5,) * 5, 'substeps.*at least'),
         ('amplifier.dq_scaling', 'peak', 'dq_scaling'),
+        ('machine.theta_max', 0.08, r"'machine.theta_max'.* gap of a motor is -.* mm"),
     ],
 )
 def test_refused(name: str, value: object, match: str) -> None:
@@ -110,6 +111,44 @@ def test_with_the_substeps_asked_for_smooth_friction_brings_to_rest_what_slides(
         stage.read()
     assert stage.state[2] > 0.0
     assert abs(stage.state[3]) < 1e-12
+
+
+@pytest.mark.parametrize(
+    'springy',
+    [
+        {'machine.spring_theta': 1e5, 'sample_time': 0.01, 'substeps': 1}
+        | {'guide.coulomb': (0.0,) * 5},
+        {'effects.friction.model': 'lugre', 'effects.friction.breakaway': (3e-8,) * 5},
+        {'effects.friction.model': 'lugre', 'effects.friction.vertical_guides': (0.0, 30.0) * 2}
+        | {'effects.friction.breakaway': (5e-8,) * 5},
+    ],
+)
+def test_with_the_substeps_asked_for_no_spring_gives_energy(springy: dict[str, object]) -> None:
+    swinging = {
+        'guide.locked': (True, True, True, True, False),
+        'initial.position': (0.025, 0.0, 0.0, 0.0, 0.0),
+        'initial.velocity': (0.0, 0.0, 0.0, 0.0, 0.05),
+        'machine.spring_theta': 4000.0,
+        **springy,
+    }
+    with pytest.raises(ParameterError, match=r'substeps.*springs.*at least') as refusal:
+        build(PlantParameters, swinging)
+    needed = int(str(refusal.value).rsplit(' ', 1)[1])
+    stage = SimulatedStage(build(PlantParameters, {**swinging, 'substeps': needed}))
+    fastest = []
+    for _ in range(600):
+        stage.read()
+        fastest.append(abs(stage.state[9]))
+    assert max(fastest) == fastest[0]
+    assert max(fastest[300:]) < 1e-6
+
+
+def test_a_cable_may_be_too_stiff_for_the_steps() -> None:
+    with pytest.raises(ParameterError, match=r'substeps.* z .*at least'):
+        build(
+            PlantParameters,
+            {'effects.cable.hysteresis': 100.0, 'effects.cable.reach': 1e-6, 'sample_time': 2e-3},
+        )
 
 
 def test_offsets_change_the_true_plant_only() -> None:

@@ -6,7 +6,9 @@ import dataclasses
 import math
 from typing import Any
 
-from maglev_model.axes import AXES, PHI, THETA, Y
+import numpy as np
+
+from maglev_model.axes import AXES, PHI, FloatArray, Y
 from maglev_model.guide import GuideParameters
 from maglev_model.machine import MachineParameters
 from maglev_model.parameters import ParameterError, group, parameter
@@ -15,7 +17,11 @@ from maglev_plant.effects.parameters import EffectParameters
 _BY_AXIS = ', by axis y, x, z, phi, theta'
 
 _LONGEST_STEP = 2.0
-"""Longest integration step in time constants of the friction; stable up to 2.78."""
+"""Longest integration step by how fast friction brakes (stable up to 2.78) or a spring swings (up
+to 2.83)."""
+
+_BRISTLES = 1.6
+"""As many times shorter with bristles: what rests on them creeps with steps above 1.4."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -196,8 +202,9 @@ class PlantParameters:
     effects: EffectParameters = group(EffectParameters)
 
     def __post_init__(self) -> None:
-        """Refuse a start outside the stops and steps too long for the friction."""
+        """Refuse a start outside the stops, a gap that closes, and steps that are too long."""
         self._check_initial()
+        self._check_gaps()
         self._check_substeps()
         if self.machine.motors == 1 and not all(self.guide.locked[2:]):
             raise ParameterError(
@@ -229,29 +236,66 @@ class PlantParameters:
         friction, tilt = self.effects.friction, math.hypot(*self.machine.upper_limit[PHI:])
         return friction.static_ratio * (1.0 + friction.tilt_load[axis] * tilt)
 
-    def _guides_rates(self) -> list[tuple[int, float]]:
-        """How fast the guides at the motors brake y, phi and theta, beginning to slide [1/s]."""
+    def _guides(self) -> FloatArray:
+        """Forces of the guides at the motors by what they accelerate, by axis [m/s², rad/s²]."""
         forces, machine, offset = self.effects.friction.vertical_guides, self.machine, self.offset
-        slope = self._breaking(Y) / self.guide.coulomb_velocity[Y]
-        tilt = slope * machine.radius**2 / (machine.inertia * offset.inertia)
-        return [
-            (Y, slope * sum(forces) / (machine.mass_y * offset.mass_y)),
-            (PHI, tilt * (forces[0] + forces[2])),
-            (THETA, tilt * (forces[1] + forces[3])),
-        ]
+        lever = machine.radius**2 / (machine.inertia * offset.inertia)
+        along_z, along_x = forces[0] + forces[2], forces[1] + forces[3]
+        level = sum(forces) / (machine.mass_y * offset.mass_y)
+        return np.array([level, 0.0, 0.0, lever * along_z, lever * along_x])
+
+    def _rates(self) -> FloatArray:
+        """How fast friction brakes each axis that begins to slide [1/s]."""
+        guide, rates = self.guide, np.array(self.guide.viscous)
+        if self.effects.friction.model == 'tanh':
+            slope = np.array([self._breaking(axis) for axis in range(5)]) / guide.coulomb_velocity
+            rates += slope * guide.coulomb + slope[Y] * self._guides()
+        return rates
+
+    def _swing(self) -> FloatArray:
+        """How fast each axis swings on springs, cable and bristles, these damped [1/s].
+
+        A bristle follows the platen's mean speed of a step: its damping wants shorter ones.
+        """
+        machine, offset, cable = self.machine, self.offset, self.effects.cable
+        friction, growth = self.effects.friction, abs(self.effects.spring.growth)
+        pull = cable.stiffness + cable.hysteresis / cable.reach
+        masses = machine.mass_x * offset.mass_x, machine.mass_z * offset.mass_z
+        springs = machine.spring_phi * offset.spring_phi, machine.spring_theta * offset.spring_theta
+        stiff = np.array([0.0, *(pull / mass for mass in masses), *springs])
+        stiff[PHI:] *= 1.0 + 0.5 * growth * (machine.gap_max - machine.gap_min)
+        if friction.model != 'lugre':
+            return np.asarray(np.sqrt(stiff))
+        breakaway = np.array(friction.breakaway)
+        stiff += self.guide.coulomb / breakaway + self._guides() / breakaway[Y]
+        return np.asarray(_BRISTLES * (1.0 + 0.5 * friction.damping) * np.sqrt(stiff))
 
     def _check_substeps(self) -> None:
-        guide = self.guide
-        rates = list(guide.viscous)
-        if self.effects.friction.model == 'tanh':
-            friction = zip(guide.coulomb, guide.coulomb_velocity, strict=True)
-            for axis, (coulomb, velocity) in enumerate(friction):
-                rates[axis] += self._breaking(axis) * coulomb / velocity
-            for axis, rate in self._guides_rates():
-                rates[axis] += rate
-        needed = math.ceil(max(rates) * self.sample_time / _LONGEST_STEP)
+        rates = np.maximum(self._rates(), self._swing())
+        needed = math.ceil(rates.max() * self.sample_time / _LONGEST_STEP)
         if self.substeps < needed:
             raise ParameterError(
-                f"parameter 'substeps' is {self.substeps}, the friction of "
-                f'{AXES[rates.index(max(rates))]} needs at least {needed}'
+                f"parameter 'substeps' is {self.substeps}, friction and springs of "
+                f'{AXES[int(rates.argmax())]} need at least {needed}'
             )
+
+    def _check_gaps(self) -> None:
+        narrowest = self.motor_gaps[0]
+        if narrowest <= 0.0:
+            raise ParameterError(
+                "parameters 'machine.phi_max' and 'machine.theta_max' let the platen tilt until "
+                f'the gap of a motor is {1e3 * narrowest:.3g} mm, it must stay above 0'
+            )
+
+    @property
+    def motor_gaps(self) -> tuple[float, float]:
+        """The narrowest and the widest gap a motor can have between the stops [m], at most."""
+        machine, seat, motor = self.machine, self.stop.seat_radius, self.effects.motor
+        if machine.motors == 1:
+            return machine.gap_min, machine.gap_max
+        tilt = max(machine.phi_max, machine.theta_max)
+        tilt = min(tilt, 0.5 * (machine.gap_max - machine.gap_min) / max(seat, 1e-9))
+        lever = machine.radius + max(0.0, *motor.place_along)
+        across = max(abs(place) for place in motor.place_across)
+        reach = (max(0.0, lever - seat) + across) * tilt
+        return machine.gap_min - reach, machine.gap_max + reach

@@ -11,7 +11,7 @@ from scipy.integrate import quad
 
 from maglev_model.motor import force_coefficients
 from maglev_model.parameters import ParameterError, build
-from maglev_plant.effects.winding import inductance, widest_gap
+from maglev_plant.effects.winding import inductance
 from maglev_plant.parameters import PlantParameters
 
 STILL = (True,) * 5
@@ -46,7 +46,7 @@ def test_an_inductance_that_k_v3_would_make_negative_is_refused() -> None:
 
 def test_seats_beyond_the_motors_leave_their_gaps_the_whole_range() -> None:
     wide = build(PlantParameters, {'stop.seat_radius': 1.0})
-    assert widest_gap(wide) == wide.machine.gap_max
+    assert wide.motor_gaps == (wide.machine.gap_min, wide.machine.gap_max)
 
 
 def test_against_the_rail_a_current_rises_as_resistance_and_inductance_let_it() -> None:

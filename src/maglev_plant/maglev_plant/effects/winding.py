@@ -1,16 +1,18 @@
 """Phase currents of the windings: resistance, L(g), back-EMF, and the rail that limits them.
 
 A motor's co-energy, with dq currents of ``scale`` amperes of phase amplitude each and i the vector
-of amplitudes, is ``W' = W_m(g) + 3/2 (ψ(g, s)·i + L(g) |i|²/2)``. Its derivative by the gap is the
-force (2), term by term, and by the displacement s the force (1), hence
+of amplitudes, is ``W' = W_m(g) + 3/2 (ψ·i + L(g) |i|²/2)``. Its derivative by the gap is the force
+(2), term by term, hence ``dL/dg = -(4/3) K_v3 L_v3 / scale²``: 93 mH from 20 to 30 mm, with
+amplitudes. Each force of the magnets has the EMF that takes its power:
 
-- ``dL/dg = -(4/3) K_v3 L_v3 / scale²``: 93 mH from 20 to 30 mm, with amplitudes;
-- along d an EMF of ``(2/3) K_v2 L_v2 / scale`` times the speed of the gap, along q one of
-  ``-(2/3) K_h L_h / scale`` times the speed along the motor: 17 V per m/s at 25 mm.
+- along d ``(2/3) K_v2 L_v2 / scale`` times the speed of the gap, by (2);
+- along q ``-(2/3) K_h L_h / scale`` times that along the motor, by (1): 17 V per m/s at 25 mm.
 
-With them what the amplifiers give is copper loss, growth of the field energy ``3/4 L |i|²`` and
-mechanical work of the forces, exactly. K_v3 fixes the slope of L alone; its value at ``gap_max`` is
-a parameter, and L must stay positive at the widest gap of a motor.
+What the amplifiers give is then copper loss, growth of the field energy ``3/4 L |i|²`` and
+mechanical work of the forces, exactly. Were (1) the derivative of W' by the displacement too,
+``K_v2 L_v2`` would be ``-(τ/π) d(K_h L_h)/dg``, of which the slots in (4) leave 0.89 to 0.95. K_v3
+fixes the slope of L alone; its value at ``gap_max`` is a parameter, and L must stay positive at the
+widest gap of a motor.
 
 Each phase has an amplifier that makes its current follow a target by a first-order loop, as long as
 the rail's voltage allows: ``v = R i + d(L i)/dt + e``, by the trapezoidal rule.
@@ -62,23 +64,13 @@ class WindingArrays(Record):
     limited: bool  # whether the rail limited a phase in this sample
 
 
-def widest_gap(parameters: PlantParameters) -> float:
-    """The widest gap a motor can have between the stops [m]."""
-    machine, seat = parameters.machine, parameters.stop.seat_radius
-    if machine.motors == 1:
-        return machine.gap_max
-    tilt = machine.phi_max, machine.theta_max
-    lever = machine.radius + max(0.0, *parameters.effects.motor.place_along)
-    across = max(abs(place) for place in parameters.effects.motor.place_across)
-    return machine.gap_max + max(0.0, lever - seat) * max(tilt) + across * max(tilt)
-
-
 def winding_arrays(parameters: PlantParameters, machine: Machine, step: float) -> WindingArrays:
     """Windings without current, for steps of ``step`` [s]; raises ParameterError."""
     given = parameters.effects.winding
     scale = SCALES[parameters.amplifier.dq_scaling]
-    low, high = 0.5 * parameters.machine.gap_min, 1.5 * widest_gap(parameters)
-    gaps = np.linspace(low, high, INTERVALS + 1)
+    narrowest, widest = parameters.motor_gaps
+    low = min(0.5 * parameters.machine.gap_min, narrowest)
+    gaps = np.linspace(low, 1.5 * widest, INTERVALS + 1)
     slope = np.array([_inductance_slope(machine, g, scale) for g in gaps])
     above = np.concatenate([[0.0], np.cumsum(_integrals(machine, gaps, scale))])
     arrays = WindingArrays(
@@ -98,12 +90,12 @@ def winding_arrays(parameters: PlantParameters, machine: Machine, step: float) -
     arrays.fixed = given.inductance
     set_current_loop(arrays, parameters.amplifier.bandwidth, step)
     strongest = max(parameters.effects.motor.winding)
-    widest = inductance(arrays.block[0], strongest, widest_gap(parameters))
-    if arrays.on and widest <= 0.0:
+    least = inductance(arrays.block[0], strongest, widest)
+    if arrays.on and least <= 0.0:
         raise ParameterError(
             f"parameter 'effects.winding.inductance' is {given.inductance:g} H, it must be more "
-            f'than {given.inductance - widest:.3g} H: K_v3 takes that away until the widest gap of '
-            f'a motor, {1e3 * widest_gap(parameters):.1f} mm'
+            f'than {given.inductance - least:.3g} H: K_v3 takes that away until the widest gap of '
+            f'a motor, {1e3 * widest:.1f} mm'
         )
     return arrays
 
