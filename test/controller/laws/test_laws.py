@@ -215,6 +215,7 @@ def test_what_the_linear_inverse_says_it_realises(wanted: list[float]) -> None:
         ('feedback_soi', {'rate_estimate': 'observer'}, 'feeds back no rate'),
         ('regulator_3dof', {'theta__controlled': True}, "'theta.controlled' is true.*false"),
         ('jacobian_lead_lag', {'compensator__equilibrium': 0.032}, 'between the stops'),
+        ('jacobian_lead_lag', {'machine__gravity': 0.0}, "'machine.gravity' is 0"),
         ('feedback_lead_lag', {'compensator__crossover': (900.0,) * 5}, 'y: a crossover of 900'),
         ('feedback_soi', {'compensator__phase_margin': 80.0}, 'y: .*at most a phase margin of'),
         (

@@ -31,6 +31,11 @@ def check(parameters: ControllerParameters) -> None:
             f"parameter 'compensator.equilibrium' is {gap:g} m, it must lie between the stops, "
             f'({machine.gap_min:g}, {machine.gap_max:g}) m'
         )
+    if machine.gravity == 0.0:
+        raise ParameterError(
+            "parameter 'machine.gravity' is 0: without weight nothing attracts at the equilibrium, "
+            'and a small current changes nothing there'
+        )
 
 
 def design(parameters: ControllerParameters, axis: str) -> AxisDesign:
