@@ -125,3 +125,18 @@ def test_wrong_units_types_and_names_are_refused(name: str, value: float) -> Non
 def test_range_upside_down_is_refused() -> None:
     with pytest.raises(ParameterError, match=r'gap_min.*gap_max'):
         build(MachineParameters, {'gap_min': 0.032})
+
+
+def test_without_slots_both_forces_have_one_coenergy_and_with_them_nearly() -> None:
+    """Of flux in a winding: by the gap it is as (2) has it, by the displacement as (1)."""
+
+    def share(machine: Machine, gap: float) -> float:
+        step = 1e-6
+        k_h = [motor.force_coefficients(machine, gap + side * step)[3] for side in (-1.0, 1.0)]
+        by_thrust = -machine.tau / math.pi * (k_h[1] - k_h[0]) / (2.0 * step)
+        return by_thrust / motor.force_coefficients(machine, gap)[1]
+
+    for gap in (0.018, 0.025, 0.03):
+        assert share(MACHINE._replace(b_0=1e-9), gap) == pytest.approx(1.0, abs=1e-6)
+    assert share(MACHINE, 0.018) == pytest.approx(0.893, abs=1e-3)
+    assert share(MACHINE, 0.03) == pytest.approx(0.950, abs=1e-3)

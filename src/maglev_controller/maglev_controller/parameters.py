@@ -68,7 +68,8 @@ class AxisParameters(AxisLoopParameters):
     weight_effort: float = parameter(1.0, 'LQR weight on w^2, R', within=(1e-15, 1e15))
     antiwindup: tuple[float, ...] = parameter(
         (0.0,),
-        'E of (17) [1/A], one for all internal-model states or one for each',
+        'E of (17) [m/A, in companion form m s^2/A to m/A], one for all internal-model states or '
+        'one for each',
         within=(-1e3, 1e3),
     )
 

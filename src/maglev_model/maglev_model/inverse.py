@@ -203,8 +203,9 @@ def exact_inverse(
     """Per motor through the quadratic (2). See the module for the arguments.
 
     With P the attraction of a motor, (6) and (7) ask for ΣP = M_y (G − w_y), P_1 − P_3 and P_4 −
-    P_2; the fourth condition is (8)'s, P_1 + P_3 = P_2 + P_4. By (2), P = (a − b i_d)² + b² i_q²,
-    so i_d = (a − √(P − b² i_q²)) / b. Attraction cannot be negative: w_y is limited so that
+    P_2. The fourth condition, of (8) that both pairs have the same sum of i_d, is here that they
+    have the same attraction, P_1 + P_3 = P_2 + P_4. By (2), P = (a − b i_d)² + b² i_q², so i_d =
+    (a − √(P − b² i_q²)) / b. Attraction cannot be negative: w_y is limited so that
     ``least_attraction`` stays, and a tilt gets at most the share ``tilt`` of it. Since P ≥ b² i_q²,
     a pair that needs much i_q, or turns the platen with more than half of the attraction, gets more
     than half, and what that cannot serve limits u_x and u_z. Of a machine with a single motor it is
