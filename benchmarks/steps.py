@@ -5,7 +5,8 @@ after which every output stays within 10 µm or 20 µrad, overshoot, the bound, 
 bound is computed apart from the profiles: at every place of the straight way how much it can be
 sped up and slowed down with attractions and thrusts (2), (6), (7) that currents of 7 A give, the
 platen carried as the law carries it at least, with friction; then the largest squared speeds b(s)
-with -2 d <= db/ds <= 2 u, a linear program.
+with -2 d <= db/ds <= 2 u, a linear program. It bounds the time from rest to rest: t_enc need not
+have the last millisecond or two of it.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ MOVES: Mapping[str, tuple[tuple[float, ...], tuple[float, ...]]] = {
 }
 BOUND = np.array([1e-5, 1e-5, 1e-5, 2e-5, 2e-5])
 CURRENT, LEAST = 7.0, 0.1
-PLACES, HALVINGS = 121, 40
+PLACES, HALVINGS, ROUNDS = 121, 40, 3
 SETTLE, AFTER = 3.0, 1.0  # [s]
 
 
@@ -81,12 +82,26 @@ def possible(machine: Machine, output: FloatArray, wanted: FloatArray) -> bool:
 
 def least_time(start: FloatArray, target: FloatArray, parameters: ReferenceParameters) -> float:
     """The bound [s]."""
-    machine, way = machine_constants(parameters.machine), target - start
-    friction = np.array(parameters.guide.coulomb) * np.sign(way)
+    way, moves = target - start, target != start
+    top = float(np.min(np.array(parameters.limits.velocity)[moves] / np.abs(way[moves])))
+    speed = np.full(PLACES, top)
+    for _ in range(ROUNDS):  # each from above: viscous friction brakes no more than this
+        speed = fastest(start, way, speed, parameters)
+    return float(np.sum(2.0 / (PLACES - 1) / (speed[1:] + speed[:-1])))
+
+
+def fastest(
+    start: FloatArray, way: FloatArray, speed: FloatArray, parameters: ReferenceParameters
+) -> FloatArray:
+    """The largest speeds (n,) [1/s] along the way, none of them above ``speed``."""
+    machine, guide = machine_constants(parameters.machine), parameters.guide
     place = np.linspace(0.0, 1.0, PLACES)
     limits = np.empty((2, PLACES))
     for row, sign in enumerate((1.0, -1.0)):
         for k, s in enumerate(place):
+            friction = np.array(guide.coulomb) * np.sign(way)
+            if sign < 0.0:
+                friction += np.array(guide.viscous) * way * speed[k]
             low, high = 0.0, 1e5
             for _ in range(HALVINGS):
                 middle = 0.5 * (low + high)
@@ -96,15 +111,14 @@ def least_time(start: FloatArray, target: FloatArray, parameters: ReferenceParam
     spacing = place[1]
     rise = 2.0 * spacing * np.maximum(limits[:, 1:], limits[:, :-1])
     step = np.diff(np.eye(PLACES), axis=0)
-    bounds = [(0.0, 0.0), *[(0.0, None)] * (PLACES - 2), (0.0, 0.0)]
+    bounds = [(0.0, 0.0), *((0.0, top**2) for top in speed[1:-1]), (0.0, 0.0)]
     found = linprog(
         -np.ones(PLACES),
         np.vstack([step, -step]),
         np.concatenate([rise[0], rise[1]]),
         bounds=bounds,
     )
-    speed = np.sqrt(np.maximum(found.x, 0.0))
-    return float(np.sum(2.0 * spacing / (speed[1:] + speed[:-1])))
+    return np.asarray(np.sqrt(np.maximum(found.x, 0.0)))
 
 
 def flown(
