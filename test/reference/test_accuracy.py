@@ -9,8 +9,12 @@ import numpy as np
 import pytest
 import yaml
 
+from maglev_controller.design.axis_design import controller_system
+from maglev_controller.design.state_space import plant_system, response
+from maglev_controller.laws import control_law
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
+from maglev_model.axes import AXES
 from maglev_model.parameters import ParameterError, build, from_yaml, read_yaml, replace
 from maglev_model.phases import Phase
 from maglev_plant.parameters import PlantParameters
@@ -182,6 +186,25 @@ def test_the_compliance_is_the_closed_loops(frequency):
     wanted = compliance(np.array([frequency]), held, table.x, sampling)
     found = math.sqrt(2.0) * error.std() / (force / mass)
     assert found == pytest.approx(wanted[0], rel=0.25)
+
+
+@pytest.mark.parametrize('axis', ['y', 'x', 'phi'])
+def test_the_compliance_is_the_sampled_loops_but_where_oscillators_are_turned(axis):
+    omega = np.geomspace(0.3, 600.0, 2000)
+    table, z = ReferenceParameters(), np.exp(1e-3j * omega)
+    held = table.held_frequencies[AXES.index(axis)]
+    told = compliance(omega, held, getattr(table, axis), table.internal_model.sampling)
+    plant = response(plant_system(1e-3), z)
+    share = {}
+    for rest in ('hold', 'fade'):
+        law = build(ControllerParameters, {'internal_model.rest': rest})
+        loop = response(controller_system(control_law(law).design(law, axis), 1e-3, 0), z)
+        share[rest] = np.abs(plant / (1.0 - plant * loop)) / told
+    assert np.all(np.abs(share['hold'] - 1.0) < 0.2)
+    assert np.all((share['fade'] > 0.5) & (share['fade'] < 2.6))
+    beyond = (omega > 1.02 * max(held)) & (omega < 2.9 * max(held))
+    assert np.all(share['fade'][beyond] < 0.85)
+    assert np.all(np.abs(share['fade'][omega > 3.2 * max(held)] - 1.0) < 0.2)
 
 
 def test_a_held_frequency_leaves_nothing_and_a_constant_neither():
