@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from maglev_controller.landing import Landing
 from maglev_controller.parameters import ControllerParameters
-from maglev_model.quintic import quintic_to_zero, transition_time
+from maglev_model.quintic import minimum_jerk, quintic_to_zero, transition_time
 
 PARAMETERS = ControllerParameters()
 LOWER = np.array(PARAMETERS.machine.lower_limit)
@@ -51,6 +51,31 @@ def test_from_any_reference_smoothly_to_the_stop(
     assert not rows[-1, 1:].any()
     down = path[400:, 0]
     assert np.all(np.diff(down) >= -1e-15)
+
+
+@pytest.mark.parametrize(
+    ('axis', 'start', 'target', 'time'),
+    [
+        (0, 0.020, 0.027, 0.06),
+        (0, 0.030, 0.025, 0.05),
+        (1, 0.0, 0.03, 0.12),
+        (2, 0.045, -0.045, 0.2),
+        (4, -0.010, 0.010, 0.06),
+    ],
+)
+def test_from_any_moment_of_a_fast_move_it_stays_within_the_stops(
+    axis: int, start: float, target: float, time: float
+) -> None:
+    """Where the platen speeds up as well, at up to 16 m/s² and 32 rad/s²."""
+    way = target - start
+    for share in np.linspace(0.0, 1.0, 60):
+        shape = [float(each[0]) for each in minimum_jerk(np.array([share]))]
+        state = np.array([[0.025, 0.0, 0.0, 0.0, 0.0], [0.0] * 5, [0.0] * 5])
+        state[:, axis] = start + way * shape[0], way * shape[1] / time, way * shape[2] / time**2
+        landing = Landing(PARAMETERS, *state)
+        path = np.array([landing.step()[0] for _ in range(400)])
+        assert np.all(path >= LOWER - 1e-9)
+        assert np.all(path <= UPPER + 1e-9)
 
 
 def test_durations_are_the_parameters() -> None:

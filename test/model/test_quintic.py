@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from maglev_model.quintic import (
     braking_times,
+    coasted,
     evaluate_quintic,
     minimum_jerk,
     minimum_jerk_peaks,
@@ -84,17 +85,25 @@ def test_the_shortest_time_meets_one_bound(
     assert transition_time(distance, acceleration, 0.0) <= time * (1.0 + 1e-12)
 
 
-@given(st.floats(0.0, 1.0), st.floats(-2.0, 2.0))
-def test_braking_stays_within_the_stops(position: float, velocity: float) -> None:
-    start, speed = np.array([position]), np.array([velocity])
+@given(st.floats(0.0, 1.0), st.floats(-2.0, 2.0), st.floats(-20.0, 20.0))
+def test_braking_stays_within_the_stops(position: float, velocity: float, push: float) -> None:
+    start, speed, bend = np.array([position]), np.array([velocity]), np.array([push])
     longest = 0.4
-    times = braking_times(start, speed, np.zeros(1), np.ones(1), longest)
+    times = braking_times(start, speed, np.zeros(1), np.ones(1), longest, bend)
     assert 0.05 <= times[0] <= longest
-    end = start + 0.5 * times * speed
+    end = start + coasted(speed, bend, times)
     if times[0] > 0.05:
         coefficients = quintic_coefficients(
-            (start, speed, np.zeros(1)), (end, np.zeros(1), np.zeros(1)), float(times[0])
+            (start, speed, bend), (end, np.zeros(1), np.zeros(1)), float(times[0])
         )
+        assert coefficients[5] == pytest.approx(0.0, abs=1e-12)
         way = evaluate_quintic(coefficients, float(times[0]), np.linspace(0.0, times[0], 50))[0]
         assert way.min() >= -1e-9
         assert way.max() <= 1.0 + 1e-9
+
+
+@pytest.mark.parametrize('position', [-0.01, 0.0, 1.0, 1.01])
+def test_what_rests_at_either_stop_or_beyond_it_takes_its_time(position: float) -> None:
+    still = np.zeros(1)
+    times = braking_times(np.array([position]), still, np.zeros(1), np.ones(1), 0.4)
+    assert times.tolist() == [0.4]

@@ -11,7 +11,7 @@ import numpy as np
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_model.axes import FloatArray
-from maglev_model.quintic import braking_times, quintic_to_zero
+from maglev_model.quintic import braking_times, coasted, quintic_to_zero
 
 _OFF_THE_STOPS = 0.03  # share of its way that an axis keeps off its stops: a bridge lands from 0.02
 
@@ -21,7 +21,7 @@ class Landing:
 
     Braking takes x and z to rest where they would come to by themselves, the tilts to 0, and y to
     rest; then y descends to the lower stop by a minimum-jerk profile, and is held there until
-    ``done``. The way stays within the stops.
+    ``done``. The way stays within the stops of a reference that would have.
     """
 
     def __init__(
@@ -42,18 +42,20 @@ class Landing:
         self._start = np.clip(np.asarray(position, dtype=np.float64), lower, upper)
         self._velocity = np.array(velocity, dtype=np.float64)
         self._acceleration = np.array(acceleration, dtype=np.float64)
-        self._brakes = braking_times(self._start, self._velocity, lower, upper, self._braking)
+        self._brakes = braking_times(
+            self._start, self._velocity, lower, upper, self._braking, self._acceleration
+        )
         self._level = self._resting_place(lower, upper)
         self._elapsed = 0.0
         self.done = False
 
     def _resting_place(self, lower: FloatArray, upper: FloatArray) -> FloatArray:
-        """Where braking ends: halfway what the velocity would cover, off the stops, tilts level."""
+        """Where braking ends: where it would come to by itself, off the stops, tilts level."""
         margin = _OFF_THE_STOPS * (upper - lower)
-        coasted = self._start + 0.5 * self._brakes * self._velocity
+        end = self._start + coasted(self._velocity, self._acceleration, self._brakes)
         least, most = lower + margin, upper - margin
         most[0] = upper[0]
-        level: FloatArray = np.clip(coasted, least, most)
+        level: FloatArray = np.clip(end, least, most)
         level[3:] = 0.0
         return level
 

@@ -130,14 +130,30 @@ LEAST_BRAKING = 0.05
 """Shortest time an axis brakes in [s], however near a stop is."""
 
 
+def coasted(velocity: FloatArray, acceleration: FloatArray | float, time: FloatArray) -> FloatArray:
+    """How far a quintic goes, (n,), that comes to rest in a ``time`` [s] as a quartic would."""
+    return np.asarray(time * (velocity / 2.0 + time * acceleration / 12.0))
+
+
 def braking_times(
-    position: FloatArray, velocity: FloatArray, lower: FloatArray, upper: FloatArray, longest: float
+    position: FloatArray,
+    velocity: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    longest: float,
+    acceleration: FloatArray | float = 0.0,
 ) -> FloatArray:
     """How long each axis brakes, shape (n,) [s]: ``longest``, or less where a stop is near.
 
-    From ``position`` at ``velocity``, (n,) each, between stops at ``lower`` and ``upper``. The
-    quintic that ends halfway what the velocity would cover then stays within the stops.
+    From ``position`` at ``velocity`` and ``acceleration``, (n,) each, between stops at ``lower``
+    and ``upper``. The quintic that ends where it has :func:`coasted` to then stays within the
+    stops, but where even :data:`LEAST_BRAKING` is too long.
     """
-    room = np.where(velocity > 0.0, upper - position, position - lower)
-    times = 1.5 * np.maximum(room, 0.0) / np.maximum(np.abs(velocity), 1e-9)
+    times = np.full(position.shape, longest)
+    for sign, room in ((1.0, upper - position), (-1.0, position - lower)):
+        speed = 0.5 * np.maximum(sign * velocity, 0.0)
+        push = np.maximum(sign * np.asarray(acceleration), 0.0) / 3.0
+        way = 0.75 * np.maximum(room, 0.0)
+        root = np.maximum(speed + np.sqrt(speed * speed + push * way), 1e-9)
+        times = np.where(speed + push > 0.0, np.minimum(times, 2.0 * way / root), times)
     return np.asarray(np.clip(times, LEAST_BRAKING, longest))
