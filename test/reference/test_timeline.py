@@ -277,6 +277,22 @@ def test_it_lands_out_of_a_raw_step(late):
     assert block.position[sample, 0] == pytest.approx(0.027 if late else 0.02)
 
 
+@pytest.mark.parametrize('target', [0.025, 0.027])
+def test_it_lands_out_of_any_moment_of_a_fast_step(target):
+    """In which y speeds up or brakes at up to 36 m/s²: no way leads far beyond a stop."""
+    start = {0.025: 0.03, 0.027: 0.02}[target]
+    step = {'steps.axis': ['y'], 'steps.start': [start], 'steps.target': [target]}
+    values = {**read_yaml(ROOT / 'params' / 'fastest.yaml', 'reference'), **SHORT, **step}
+    parameters = scenario('steps', **values, **{'steps.settle': 0.05})
+    first = next(each.first for each in Timeline(parameters).segments if each.phase == Phase.STEP)
+    for sample in range(first, first + 60, 2):
+        timeline = Timeline(parameters)
+        assert timeline.land(sample)
+        block = whole(timeline)
+        assert block.position[sample:, 0].min() > 0.018
+        assert block.position[sample:, 0].max() < 0.0316
+
+
 def test_every_parameter_is_listed_with_its_default():
     listed = read_yaml(ROOT / 'params' / 'reference.yaml', 'reference')
     assert build(ReferenceNodeParameters, listed) == ReferenceNodeParameters()

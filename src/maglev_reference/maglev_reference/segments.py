@@ -10,7 +10,7 @@ import numpy as np
 
 from maglev_model.axes import PHI, FloatArray, Y
 from maglev_model.phases import Phase
-from maglev_model.quintic import minimum_jerk_time
+from maglev_model.quintic import coasted, minimum_jerk_time
 from maglev_reference.check import utilisation, within
 from maglev_reference.currents import current_utilisation
 from maglev_reference.motion import Motion, Quintic, Stand, State, state_at
@@ -106,7 +106,8 @@ class Planner:
         lower[Y], upper[Y] = self._parameters.home[Y], self._parameters.lift_off.rest_gap
 
         def rest(duration: float) -> State:
-            point = np.clip(start.position + 0.5 * duration * start.velocity, lower, upper)
+            way = coasted(start.velocity, start.acceleration, np.asarray(duration))
+            point = np.clip(start.position + way, lower, upper)
             point[PHI:] = 0.0
             return State.at_rest(point)
 
@@ -201,21 +202,21 @@ class Planner:
     ) -> None:
         """Append the first move within limits, of ``duration`` or longer, else shorter.
 
-        With ``best`` the one that offends least is taken where none is within; otherwise the one
-        of ``duration`` is, and the check of the whole reference says what is wrong with it.
+        With ``best`` the one that offends least is taken where none is within, by its currents
+        rather than by where it leads; otherwise the one of ``duration`` is, and the check of the
+        whole reference says what is wrong with it.
         """
-        chosen: tuple[float, Quintic, int] | None = None
+        chosen: tuple[tuple[float, ...], Quintic, int] | None = None
         for trial in self._trial_times(end(duration), duration):
             count = max(1, self._samples(trial))
             time = count * self._parameters.sample_time
             motion = Quintic(self._state, end(time), time)
             samples = motion.evaluate(np.linspace(0.0, time, _GRID))
-            used = max(
-                utilisation(samples, self._parameters),
-                current_utilisation(samples, self._parameters),
-            )
-            if chosen is None or within(used) or (best and used < chosen[0]):
-                chosen = (used, motion, count)
+            of_limits = utilisation(samples, self._parameters)
+            used = max(of_limits, current_utilisation(samples, self._parameters))
+            offence = max(of_limits, 1.0), used, of_limits
+            if chosen is None or within(used) or (best and offence < chosen[0]):
+                chosen = (offence, motion, count)
             if within(used):
                 break
         assert chosen is not None
