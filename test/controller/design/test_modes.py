@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import control
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from maglev_controller.design.axis_design import controller_system
-from maglev_controller.design.margins import all_margins, check_margins
+from maglev_controller.design.margins import all_margins, check_margins, loop_margins
 from maglev_controller.design.notch import notch, notch_response, notch_system
 from maglev_controller.design.state_space import Mode, closed_loop, plant_system, response
 from maglev_controller.laws.output_regulator import design
@@ -149,3 +150,24 @@ def test_what_cannot_be_is_refused(changes: dict[str, object], reason: str) -> N
     """A mode with its frequency, lists with their lengths."""
     with pytest.raises(ParameterError, match=reason):
         Regulator(with_mode(90.0, -0.3, **{'margins.override': True, **changes}))
+
+
+def test_of_two_modes_either_may_be_missing_and_they_may_be_off_by_other_shares() -> None:
+    """The margins are the least there are, also where only one of them shows."""
+    omega, gain = (102.5, 125.6), (-0.1, 0.3)
+    both = {'axis': ('x', 'x'), 'frequency': omega, 'damping': (0.01, 0.01), 'gain': gain}
+    parameters = build(
+        ControllerParameters, {f'modes.{name}': value for name, value in both.items()}
+    )
+    chosen = design(parameters, 'x')
+    told = all_margins(parameters, [chosen] * 5)[1].sensitivity
+    assert told < parameters.modes.sensitivity
+    for shares in itertools.product((0.95, 0.98, 1.0, 1.05), repeat=2):
+        for parts in itertools.product((0.0, 0.5, 1.0), repeat=2):
+            modes = tuple(
+                Mode(2.0 * math.pi * frequency * share, 0.01, part * size)
+                for frequency, size, share, part in zip(omega, gain, shares, parts, strict=True)
+            )
+            found = loop_margins(chosen, PERIOD, modes=modes)
+            assert found.spectral_radius < 1.0
+            assert found.sensitivity < 1.02 * told

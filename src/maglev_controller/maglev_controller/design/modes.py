@@ -37,6 +37,7 @@ FACTORS: Final = tuple(0.93**power for power in range(17))
 _PLACES = (0.75, 0.82, 0.88, 0.92, 0.96, 1.0, 1.04, 1.08, 1.13, 1.2, 1.35)  # of notch by mode
 _WIDTHS = (0.08, 0.16, 0.3, 0.5, 0.8)
 _DEPTH = 0.03
+_SHARES = (-1.0, -0.5, 0.0, 0.5, 1.0)  # of the tolerance
 _LOWEST = 1.0  # frequency looked at [rad/s]
 _POINTS = 200
 
@@ -52,14 +53,28 @@ class Case(NamedTuple):
 
 
 def variants(modes: Sequence[Mode], tolerance: float) -> list[tuple[Mode, ...]]:
-    """The modes as they may be: all of them off by as much, none at all, half their gain."""
+    """The modes as they may be: all of them off by as much, none at all, half their gain.
+
+    Where there are several, also each alone, and one off one way and another the other.
+    """
     if not modes:
         return [()]
     found: list[tuple[Mode, ...]] = [(), tuple(m._replace(gain=0.5 * m.gain) for m in modes)]
-    for share in (-1.0, -0.5, 0.0, 0.5, 1.0):
-        factor = 1.0 + share * tolerance
-        found.append(tuple(m._replace(frequency=factor * m.frequency) for m in modes))
+    for share in _SHARES:
+        off = tuple(_off(mode, share * tolerance) for mode in modes)
+        found.append(off)
+        if len(modes) > 1:
+            found += [(mode,) for mode in off]
+    for signs in itertools.product((-1.0, 1.0), repeat=len(modes)):
+        if len(set(signs)) > 1:
+            found.append(
+                tuple(_off(m, sign * tolerance) for m, sign in zip(modes, signs, strict=True))
+            )
     return found
+
+
+def _off(mode: Mode, share: float) -> Mode:
+    return mode._replace(frequency=(1.0 + share) * mode.frequency)
 
 
 def stabilised(build: Callable[[float], AxisDesign], case: Case) -> AxisDesign:
