@@ -9,7 +9,13 @@ from hypothesis import strategies as st
 
 from maglev_controller.landing import Landing
 from maglev_controller.parameters import ControllerParameters
+from maglev_controller.regulator import Regulator
+from maglev_model.parameters import build
 from maglev_model.quintic import minimum_jerk, quintic_to_zero, transition_time
+from maglev_plant.parameters import PlantParameters
+from maglev_plant.simulation import SimulatedStage
+from maglev_study.closed_loop import run
+from maglev_study.references import References, held, joined, shaped
 
 PARAMETERS = ControllerParameters()
 LOWER = np.array(PARAMETERS.machine.lower_limit)
@@ -76,6 +82,21 @@ def test_from_any_moment_of_a_fast_move_it_stays_within_the_stops(
         path = np.array([landing.step()[0] for _ in range(400)])
         assert np.all(path >= LOWER - 1e-9)
         assert np.all(path <= UPPER + 1e-9)
+
+
+@pytest.mark.parametrize('lost', [3, 7, 12, 20])
+def test_lost_in_a_fast_rise_it_meets_no_stop_hard(lost: int) -> None:
+    """5 mm in 45 ms; after so many of them there is no reference any more."""
+    low, high = (np.array([y, 0.0, 0.0, 0.0, 0.0]) for y in (0.03, 0.025))
+    risen = References(*(column[:lost] for column in shaped(low, high, 0.045, 0.0, 1e-3)))
+    landing, descent = Landing(PARAMETERS, *(column[-1] for column in risen)), []
+    while not landing.done:
+        descent.append(landing.step())
+    down = References(*(np.array(column) for column in zip(*descent, strict=True)))
+    stage = SimulatedStage(build(PlantParameters, {'initial.position': tuple(low)}))
+    flown = run(Regulator(PARAMETERS), stage, joined(held(low, 0.3, 1e-3), risen, down)).state[300:]
+    assert flown[:, 0].min() > LOWER[0] + 1e-4
+    assert np.abs(np.diff(flown[:, 1])).max() < 0.05
 
 
 def test_durations_are_the_parameters() -> None:

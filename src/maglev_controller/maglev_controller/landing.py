@@ -21,7 +21,8 @@ class Landing:
 
     Braking takes x and z to rest where they would come to by themselves, the tilts to 0, and y to
     rest; then y descends to the lower stop by a minimum-jerk profile, and is held there until
-    ``done``. The way stays within the stops of a reference that would have.
+    ``done``. The way stays within the stops of a reference that would have; an acceleration above
+    ``jumps.acceleration`` is let go at once, for what undoes it smoothly may be more than weight.
     """
 
     def __init__(
@@ -41,7 +42,8 @@ class Landing:
         lower, upper = np.array(machine.lower_limit), np.array(machine.upper_limit)
         self._start = np.clip(np.asarray(position, dtype=np.float64), lower, upper)
         self._velocity = np.array(velocity, dtype=np.float64)
-        self._acceleration = np.array(acceleration, dtype=np.float64)
+        most = np.array(parameters.jumps.acceleration)
+        self._acceleration = np.clip(acceleration, -most, most)
         self._brakes = braking_times(
             self._start, self._velocity, lower, upper, self._braking, self._acceleration
         )
