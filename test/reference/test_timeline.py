@@ -290,6 +290,7 @@ def test_it_lands_out_of_any_moment_of_a_fast_step(target):
         assert timeline.land(sample)
         block = whole(timeline)
         assert block.position[sample:, 0].min() > 0.018
+        assert block.acceleration[sample:, 0].max() < 9.0  # less than the weight takes
         assert block.position[sample:, 0].max() < 0.0316
 
 

@@ -21,6 +21,7 @@ _STRETCH = 1.25  # from one tried move time to the next
 _TRIALS = 24
 _GRID = 201  # points at which a tried move is checked
 _BRAKING_MARGIN = 0.1  # of the range, that a braking platen keeps away from its limits
+_UNDONE = np.array([5.0, 5.0, 5.0, 20.0, 20.0])  # acceleration, at most [m/s^2, rad/s^2]
 _SAMPLE_MAX = 2**62
 
 
@@ -95,8 +96,12 @@ class Planner:
         self._move_to(np.array(parameters.home))
 
     def brake(self) -> None:
-        """LAND: come to rest, level and nearby, away from the upper stop and from the limits."""
-        start = self._state
+        """LAND: come to rest, level and nearby, away from the upper stop and from the limits.
+
+        An acceleration that would take too much to undo smoothly is let go at once.
+        """
+        bend = np.clip(self._state.acceleration, -_UNDONE, _UNDONE)
+        self._state = start = self._state._replace(acceleration=bend)
         lower, upper = (
             np.array(self._parameters.limits.lower),
             np.array(self._parameters.limits.upper),
