@@ -145,6 +145,9 @@ def test_a_managed_node(stage: str, nodes: Nodes, observer: Observer) -> None:
     assert life.state == 'inactive'
     assert numbers(observer) == []
     assert life.change(Transition.TRANSITION_ACTIVATE)
+    for unknown in (Transition.TRANSITION_ACTIVATE, Transition.TRANSITION_CONFIGURE, 200):
+        assert not life.change(unknown)
+    process.wait_for("transition '3' refused: active, from where there are deactivate (4)")
     observer.wait(lambda: bool(numbers(observer)))
     assert life.change(Transition.TRANSITION_DEACTIVATE)
     assert life.state == 'inactive'

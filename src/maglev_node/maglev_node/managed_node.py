@@ -6,7 +6,7 @@ import dataclasses
 import gc
 from collections.abc import Callable
 from functools import partial
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 
@@ -41,6 +41,8 @@ class ManagedNode(LifecycleNodeMixin, MaglevNode[P]):
     def __init__(self, name: str, parameter_table: type[P]) -> None:
         MaglevNode.__init__(self, name, parameter_table)
         LifecycleNodeMixin.__init__(self)
+        self._change_state = self._service_change_state.callback
+        self._service_change_state.callback = self._on_change_state
         self._bringing_up = False
         self._refusal: Exception | None = None
 
@@ -79,17 +81,29 @@ class ManagedNode(LifecycleNodeMixin, MaglevNode[P]):
     def _autostart(self) -> None:
         """Activate when the graph is served, so that nothing comes between that and work."""
         self._start.cancel()
-        if not self._bringing_up:  # the executor had the timer's next event already
-            return
-        result = self.trigger_activate()
-        self._bringing_up = False
-        if result != TransitionCallbackReturn.SUCCESS:
+        # A service may have been faster, or the executor had the timer's next event already.
+        due = self._bringing_up and self.state == 'inactive'
+        if due and self.trigger_activate() != TransitionCallbackReturn.SUCCESS:
             self.fail(str(self._refusal))
+        self._bringing_up = False
 
     def _demand(self, result: TransitionCallbackReturn) -> None:
         if result != TransitionCallbackReturn.SUCCESS:
             assert self._refusal is not None
             raise self._refusal
+
+    def _on_change_state(self, request: Any, response: Any) -> Any:
+        """As rclpy, which ends a node that is asked for what does not begin in its state."""
+        wanted = request.transition.label or request.transition.id
+        known = {number: label for number, label, *_ in self._state_machine.available_transitions}
+        if wanted in known or wanted in known.values():
+            return self._change_state(request, response)
+        self.get_logger().error(
+            f"transition '{wanted}' refused: {self.state}, from where there are "
+            + ', '.join(f'{label} ({number})' for number, label in known.items())
+        )
+        response.success = False
+        return response
 
     def _transit(
         self, name: str, state: str, *actions: Callable[[], None]
