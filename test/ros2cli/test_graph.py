@@ -196,11 +196,10 @@ def test_set(ros2: Ros2, small: Process) -> None:
     code, out, err = ros2('param', 'set', '/small', 'limits.current', '-6.5')
     assert (code, out) == (0, '')
     assert err == (
-        'Setting parameter failed: Parameter limits.current out of range Min: 0.1, Max: 50.0,'
-        ' value: -6.5\n'
+        "Setting parameter failed: parameter 'limits.current' is -6.5, it must lie in [0.1, 50] A\n"
     )
     err = ros2('param', 'set', '/small', 'limits.current', 'hello').err
-    assert err.startswith('Setting parameter failed: Wrong parameter type, expected')
+    assert "'limits.current' is 'hello' (str), its type is double" in err
 
 
 def test_dump_and_load(ros2: Ros2, small: Process, tmp_path: object) -> None:

@@ -9,7 +9,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
-from maglev_model.parameters import group, parameter
+from maglev_model.parameters import group, parameter, specs
 from maglev_msgs.msg import Measurement
 from maglev_node.executable import run_nodes
 from maglev_node.managed_node import ManagedNode, ManagedParameters
@@ -36,6 +36,8 @@ class SmallParameters(ManagedParameters):
 class SmallStage(ManagedNode[SmallParameters]):
     """Measures at 100 Hz what never changes, and says once what it is, for whoever comes."""
 
+    changeable = specs(SmallParameters)
+
     def __init__(self) -> None:
         super().__init__('small', SmallParameters)
         self.create_service(SetBool, '~/enable', self._enable)
@@ -46,9 +48,6 @@ class SmallStage(ManagedNode[SmallParameters]):
         self.create_subscription(String, 'heard', self._hear, 10)
         self._sequence = 0
         self.create_timer(0.01, self._measure, clock=self.steady_clock)
-
-    def on_parameters(self, parameters: SmallParameters) -> None:
-        """All may change."""
 
     def _measure(self) -> None:
         message = Measurement(sequence=self._sequence, x=0.018, lockstep=True)

@@ -80,6 +80,8 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         '~/learn': 'std_srvs/SetBool: learn over the next passes; false: no more',
     }
 
+    changeable = specs(ControllerNodeParameters)
+
     def __init__(self) -> None:
         super().__init__('controller', ControllerNodeParameters)
         self._lockstep = self.parameters.mode == 'lockstep'
@@ -319,10 +321,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
             self._answer(self._pending)
 
     def on_parameters(self, parameters: ControllerNodeParameters) -> None:
-        """Redesign in another process, serving the loop, and change over between two samples.
-
-        The loop is served between all that takes a millisecond.
-        """
+        """Redesign in another process; the loop is served between all that takes a millisecond."""
         self._serve_by_hand()
         law = self._law(parameters)
         self._serve_by_hand()

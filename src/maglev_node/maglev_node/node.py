@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar
@@ -82,11 +82,15 @@ class MaglevNode(PollingNode, Generic[P]):
     interface: ClassVar[Mapping[str, str]] = {}
     """The topics and services of the node, each with what it is, for ``--help``."""
 
+    changeable: ClassVar[Container[str]] = ()
+    """The parameters that may change while the node runs, but for those that are read-only."""
+
     def __init__(self, name: str, parameter_table: type[P], **node_options: Any) -> None:
-        super().__init__(name, **node_options)
+        super().__init__(name, start_parameter_services=False, **node_options)
         self.at_end = ExitStack()
         """What is closed with the node, after its publishers and all."""
-        self.parameters: P = ros_parameters.declare(self, name, parameter_table)
+        self.parameters: P = ros_parameters.declare(self, name, parameter_table, self.changeable)
+        self._parameter_service = ros_parameters.ParameterService(self, parameter_table)
         realtime.take_processors(self.parameters.processors)
         self.add_on_set_parameters_callback(self._on_set_parameters)
         self.steady_clock = Clock(clock_type=ClockType.STEADY_TIME)
@@ -164,7 +168,6 @@ class MaglevNode(PollingNode, Generic[P]):
 
     def on_parameters(self, parameters: P) -> None:
         """Take new, valid parameters while running. Raises ParameterError to refuse them."""
-        raise ParameterError('this node takes no parameters while it runs')
 
     def diagnose(self) -> tuple[bytes, str, Mapping[str, object]]:
         """Level (REP-107), message and values for ``/diagnostics``."""

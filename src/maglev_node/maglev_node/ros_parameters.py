@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import itertools
 import sys
-from collections.abc import Mapping, Sequence
-from typing import TypeVar
+from collections.abc import Container, Iterable, Mapping, Sequence
+from typing import Any, TypeVar
 
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
+from rclpy import parameter_service
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from maglev_model import parameters as table
-from maglev_model.parameters import Spec, for_others, unknown_parameter
+from maglev_model.parameters import ParameterError, Spec, for_others, unknown_parameter
 
 T = TypeVar('T')
 
@@ -24,8 +30,59 @@ def is_ros_own(name: str) -> bool:
     return name.split('.')[0] in _ROS_OWN
 
 
-def declare(node: Node, name: str, parameter_table: type[T]) -> T:
+class ParameterService(parameter_service.ParameterService):
+    """As rclpy's, but what is to be set is looked at by the table: refused in the same words as
+    what a node is started with, and a whole number is one of a double.
+
+    rclpy names neither the parameter nor the value of a wrong type, and a value of a type that
+    there is not ends a node.
+    """
+
+    def __init__(self, node: Node, parameter_table: type[Any]) -> None:
+        super().__init__(node)
+        self._specs = table.specs(parameter_table)
+
+    def _set_parameters_callback(self, request: Any, response: Any) -> Any:
+        response.results = [self._set([each]) for each in request.parameters]
+        return response
+
+    def _set_parameters_atomically_callback(self, request: Any, response: Any) -> Any:
+        response.result = self._set(request.parameters)
+        return response
+
+    def _set(self, given: Iterable[Any]) -> SetParametersResult:
+        node = self._get_node()
+        try:
+            return node.set_parameters_atomically([self._checked(node, each) for each in given])
+        except ParameterError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+
+    def _checked(self, node: Node, given: Any) -> Parameter:
+        """What is given, as the node holds it. Raises ParameterError."""
+        name, spec = given.name, self._specs.get(given.name)
+        if spec is None and not node.has_parameter(name):
+            raise unknown_parameter(name, self._specs)
+        if node.describe_parameter(name).read_only:
+            raise ParameterError(f"parameter '{name}' is read-only: it is given at the start")
+        try:
+            parameter = Parameter.from_parameter_msg(given)
+        except ValueError as error:
+            raise ParameterError(f"parameter '{name}' has a value of no type") from error
+        if spec is None:
+            return parameter
+        value = spec.check(parameter.value)
+        return Parameter(name, _type(spec), list(value) if spec.array else value)
+
+
+def _type(spec: Spec) -> Parameter.Type:
+    name = spec.type_name.removesuffix('[]').upper()
+    return Parameter.Type[f'{name}_ARRAY' if spec.array else name]
+
+
+def declare(node: Node, name: str, parameter_table: type[T], changeable: Container[str] = ()) -> T:
     """Declare every parameter of a table on a node and return the table as configured.
+
+    Read-only are all but what is ``changeable`` while the node runs.
 
     It is given what the command line holds for ``name``, its name by itself, and for the name it
     has on the graph: files in their order, then single values. (ROS would not give a node in a
@@ -40,7 +97,9 @@ def declare(node: Node, name: str, parameter_table: type[T]) -> T:
     built = table.build(parameter_table, _ours(given, specs))
     for key, value in table.values(built).items():
         value = list(value) if isinstance(value, tuple) else value
-        node.declare_parameter(key, value, descriptor(specs[key]), ignore_override=True)
+        described = descriptor(specs[key])
+        described.read_only |= key not in changeable
+        node.declare_parameter(key, value, described, ignore_override=True)
     return built
 
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Generic, TypeVar
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import Trigger
 
-from maglev_model.parameters import ParameterError
 from maglev_model.stage import Stage
 from maglev_node.graph_guard import GraphGuard
 from maglev_node.managed_node import ManagedNode
@@ -17,8 +15,6 @@ from maglev_node.node import NodeError
 from maglev_node.sampling import Sampling
 from maglev_node.stage_parameters import StageNodeParameters
 from maglev_node.topics import CLOCK, CURRENTS, MEASUREMENT, STAGE_PROGRESS
-
-_TIMEOUTS = ('answer_timeout', 'watchdog', 'overrun_limit')
 
 P = TypeVar('P', bound=StageNodeParameters)
 S = TypeVar('S', bound=Stage)
@@ -41,6 +37,8 @@ class StageNode(ManagedNode[P], Generic[P, S]):
         '~/reset': 'std_srvs/Trigger: clear a fault',
         '~/change_state': 'lifecycle_msgs/ChangeState, with the other life-cycle services',
     }
+
+    changeable = ('answer_timeout', 'watchdog', 'overrun_limit')
 
     def __init__(self, name: str, parameter_table: type[P], make_stage: Callable[[P], S]) -> None:
         super().__init__(name, parameter_table)
@@ -142,16 +140,6 @@ class StageNode(ManagedNode[P], Generic[P, S]):
     def _emergency_stop(self) -> tuple[bool, str]:
         self.require_active()
         return True, self.sampling.emergency_stop()
-
-    def on_parameters(self, parameters: P) -> None:
-        """Only the time-outs change while running."""
-        changeable = {
-            name: getattr(parameters, name) for name in _TIMEOUTS if hasattr(parameters, name)
-        }
-        if parameters != dataclasses.replace(self.parameters, **changeable):
-            raise ParameterError(
-                f'only {", ".join(changeable)} can change while the stage runs; restart it instead'
-            )
 
     def diagnose(self) -> tuple[bytes, str, Mapping[str, object]]:
         """ERROR when a fault is latched, WARN when samples came late."""

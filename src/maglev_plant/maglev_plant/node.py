@@ -31,6 +31,5 @@ class PlantNode(StageNode[PlantNodeParameters, SimulatedStage]):
 
     def on_parameters(self, parameters: PlantNodeParameters) -> None:
         """Let the stage know its new watchdog."""
-        super().on_parameters(parameters)
         if self.configured:
             self.stage.watchdog = parameters.watchdog
