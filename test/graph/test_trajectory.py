@@ -39,6 +39,8 @@ def test_it_is_followed_from_the_hover_or_refused(nodes: Nodes, watching: Observ
     longest = JointTrajectory(joint_names=['x'], points=4000 * to_x(0.01).points)
     publisher.publish(longest)
     reference.wait_for('trajectory refused: the message has', timeout=60.0)
+    publisher.publish(b'\x00\x01\x00\x00')
+    reference.wait_for('trajectory refused: the message is no trajectory_msgs', timeout=60.0)
     publisher.publish(to_x(0.01))
     reference.wait_for('following a trajectory of 0.5 s, then hovering', timeout=60.0)
     settles(watching, 1, 0.01)

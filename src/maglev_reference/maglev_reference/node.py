@@ -297,7 +297,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
                     f'the message has {len(data)} bytes, it must have at most '
                     f'{_LONGEST_TRAJECTORY}: give fewer points, they are joined by quintics'
                 )
-            message = deserialize_message(data, JointTrajectory)
+            message = _read(data)
             if message.header.stamp.sec or message.header.stamp.nanosec:
                 raise UnreachableError('header.stamp must be 0: it starts at once')
             points = [_point(each) for each in message.points]
@@ -384,6 +384,13 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         """Serve the graph."""
         self.take_realtime_priority()
         super().spin(stop)
+
+
+def _read(data: bytes) -> Any:
+    try:
+        return deserialize_message(data, JointTrajectory)
+    except RuntimeError as error:  # which rclpy's are
+        raise UnreachableError('the message is no trajectory_msgs/JointTrajectory') from error
 
 
 def _point(given: Any) -> Point:
