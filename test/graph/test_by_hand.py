@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import time
 from collections.abc import Iterator
 
 import pytest
 import rclpy
-from graph import Observer
+from graph import Nodes, Observer
+from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
 from maglev_controller.node import ControllerNode
@@ -35,13 +38,18 @@ class EndlessDesign:
     def __init__(self, node: ControllerNode) -> None:
         self._node = node
         self._begun = time.monotonic()
+        self.ended = False
 
     @property
     def done(self) -> bool:
-        return self._node.supervisor.mode == Mode.FAULT or time.monotonic() > self._begun + 30.0
+        late = time.monotonic() > self._begun + 30.0
+        return self.ended or late or self._node.supervisor.mode == Mode.FAULT
+
+    def end(self) -> None:
+        self.ended = True
 
     def result(self) -> None:
-        raise ParameterError('it ended')
+        raise ParameterError('it was ended' if self.ended else 'it ended')
 
 
 @pytest.fixture
@@ -95,3 +103,26 @@ def test_nor_for_a_stage_that_is_never_out_of_measurements(
         controller.on_parameters(replace(controller.parameters, {'y.bandwidth': 180.0}))
     assert controller.supervisor.reason == 'emergency stop'
     assert time.monotonic() < end, 'it was served only when no more measurements came'
+
+
+@pytest.mark.usefixtures('endless')
+def test_a_node_that_is_told_to_end_designs_nothing(controller: ControllerNode) -> None:
+    told = iter([False, False])  # before the design, and when it has begun
+    controller.ending = lambda: next(told, True)
+    tuned = [Parameter('y.bandwidth', value=180.0)]
+    assert controller.set_parameters_atomically(tuned).reason == 'it was ended'
+    assert controller.set_parameters_atomically(tuned).reason == 'the node is told to end'
+
+
+def test_a_signal_does_not_wait_for_all_that_is_to_be_set(nodes: Nodes, observer: Observer) -> None:
+    process = nodes.start('controller')
+    process.wait_for('waiting for')
+    asked = [
+        observer.begin_to_set('controller', y__bandwidth=100.0 + number) for number in range(40)
+    ]
+    observer.answer(asked[0])
+    os.killpg(process.pid, signal.SIGINT)  # as Ctrl-C, which reaches the design's process too
+    assert process.wait() == 0
+    observer.serve(0.2)
+    assert sum(each.done() and each.result().result.successful for each in asked) < 20
+    assert 'Traceback' not in process.output

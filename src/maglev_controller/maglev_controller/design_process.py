@@ -52,7 +52,10 @@ class DesignProcess:
                 pickle.dump((regulator.arrays, parameters), given)
                 given.seek(0)
                 self._process = subprocess.Popen(
-                    [sys.executable, '-S', '-c', _PROGRAM], stdin=given, stdout=self._output
+                    [sys.executable, '-S', '-c', _PROGRAM],
+                    stdin=given,
+                    stdout=self._output,
+                    start_new_session=True,  # Ctrl-C is for the node, which ends it
                 )
                 self._files = files.pop_all()
         except OSError as error:
@@ -62,15 +65,21 @@ class DesignProcess:
     def done(self) -> bool:
         """Whether there is a result; a design that takes too long is ended."""
         if time.monotonic() - self._begun > _LONGEST:
-            self._process.kill()
-            self._process.wait()
+            self.end()
         return self._process.poll() is not None
+
+    def end(self) -> None:
+        """Design no more: there will be no result."""
+        self._process.kill()
+        self._process.wait()
 
     def result(self) -> tuple[Regulator, ModelMaps]:
         """The new regulator and how it takes over. Raises ParameterError when there is none."""
         with self._files:
             if self._process.returncode != 0:
-                raise ParameterError('the design failed or took too long; the old gains stay')
+                raise ParameterError(
+                    'the design failed, took too long or was ended; the old gains stay'
+                )
             try:
                 self._output.seek(0)
                 outcome = pickle.load(self._output)

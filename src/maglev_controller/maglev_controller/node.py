@@ -79,7 +79,6 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         '~/reset': 'std_srvs/Trigger: clear a fault',
         '~/learn': 'std_srvs/SetBool: learn over the next passes; false: no more',
     }
-
     changeable = specs(ControllerNodeParameters)
 
     def __init__(self) -> None:
@@ -328,6 +327,8 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         if law != self.supervisor.parameters:
             design = self.supervisor.redesign(law)
             while not design.done:
+                if self.ending():
+                    design.end()
                 self._serve_by_hand()
                 time.sleep(_HAND_PERIOD)
             regulator = design.result()

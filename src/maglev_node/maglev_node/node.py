@@ -99,6 +99,8 @@ class MaglevNode(PollingNode, Generic[P]):
         self.exit_code: int | None = None
         self.failed = False
         """Whether what is wrong was said by :meth:`fail`."""
+        self.ending: Callable[[], bool] = lambda: False
+        """Whether a signal has told the process to end: nothing that takes its time is begun."""
         self.discovering_since = discovery.begun()
         """When the middleware began to find who else is on the graph [s, monotonic]."""
         self._said_refused = False
@@ -177,6 +179,8 @@ class MaglevNode(PollingNode, Generic[P]):
         ours = {p.name: p.value for p in changes if not ros_parameters.is_ros_own(p.name)}
         if not ours:
             return SetParametersResult(successful=True)
+        if self.ending():
+            return SetParametersResult(successful=False, reason='the node is told to end')
         try:
             changed = table.replace(self.parameters, ours)
             self.on_parameters(changed)

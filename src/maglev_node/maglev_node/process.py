@@ -79,6 +79,8 @@ def _spin(nodes: Sequence[MaglevNode[Any]], caught: Sequence[int]) -> None:
     def stop() -> bool:
         return bool(caught) and (all(node.may_stop() for node in nodes) or len(caught) > 1)
 
+    for node in nodes:
+        node.ending = lambda: bool(caught)
     if len(nodes) == 1:
         nodes[0].spin(stop)
     else:

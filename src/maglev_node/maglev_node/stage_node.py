@@ -37,7 +37,6 @@ class StageNode(ManagedNode[P], Generic[P, S]):
         '~/reset': 'std_srvs/Trigger: clear a fault',
         '~/change_state': 'lifecycle_msgs/ChangeState, with the other life-cycle services',
     }
-
     changeable = ('answer_timeout', 'watchdog', 'overrun_limit')
 
     def __init__(self, name: str, parameter_table: type[P], make_stage: Callable[[P], S]) -> None:
