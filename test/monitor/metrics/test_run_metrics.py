@@ -12,6 +12,7 @@ from made_up_run import OWN, TOPICS, Encoder, make_run
 from run_figures import RUN, figures
 
 from maglev_model.axes import AXES
+from maglev_model.modes import Mode
 from maglev_model.parameters import build
 from maglev_model.phases import Phase
 from maglev_monitor.metrics.decoding import Records, decode
@@ -35,6 +36,21 @@ def test_tracking_errors(run: Any, records: dict[str, Records]) -> None:
     assert found['verdict'] == 'pass'
     assert found['samples'] == np.count_nonzero(np.isin(run.phase, (Phase.TRACK, Phase.STEP)))
     assert found['duration'] == pytest.approx(found['samples'] * 1e-3)
+
+
+@pytest.mark.parametrize('mode', [Mode.LANDING, Mode.FAULT])
+def test_a_run_that_its_controller_left_fails(records: dict[str, Records], mode: Mode) -> None:
+    states = records['controller'] = records['controller'].copy()
+    states['mode'] = Mode.REGULATING
+    end = records['reference']['sequence'][records['reference']['phase'] == Phase.END].min()
+    states['mode'][states['sequence'] >= end] = mode  # after the run it may do what it likes
+    assert figures(records)['verdict'] == 'pass'
+    states['mode'][states['sequence'] >= end - 70] = mode
+    found = figures(records)
+    assert found['verdict'] == 'fail'
+    assert found['reasons'] == [
+        f'from sample {end - 70} on the controller landed by itself, or had given up'
+    ]
 
 
 def test_errors_on_the_encoders_own_scales_and_the_verdict_by_them(

@@ -160,7 +160,8 @@ class RunMetrics:
         }
         if self._further:
             figures['further'] = {name: one.result() for name, one in self._further.items()}
-        return {**figures, **verdict(figures, run, whole=self._whole, ended=self.ended)}
+        judged = verdict(figures, run, whole=self._whole, ended=self.ended, left=self._faults.left)
+        return {**figures, **judged}
 
     def _step_results(self, source: int) -> list[dict[str, Any]]:
         return [entry for step in self._steps for entry in step.results(source)]
@@ -215,6 +216,7 @@ class RunMetrics:
         for metric in self._further.values():
             metric.add(rows, position)
         self._currents.add(rows)
+        self._faults.look(rows)
         timed = rows[rows['has_measurement']]
         if len(timed):
             if self._timing.latest is None:
