@@ -48,7 +48,10 @@ class Faults:
             self._tidy(node)
 
     def look(self, rows: Records) -> None:
-        """Take the run's next rows of :data:`.joiner.ROW`."""
+        """Take the run's next rows of :data:`.joiner.ROW`, in the end with the first of END.
+
+        That one may lie where the controller landed, when the reference was late to tell of it.
+        """
         gone = rows['sequence'][np.isin(rows['mode'], _GONE)]
         if self.left is None and len(gone):
             self.left = int(gone[0])

@@ -120,6 +120,7 @@ class RunMetrics:
             self.ended = True
             last = first + int(ends[0])
         rows = block[first:last]
+        self._faults.look(block[first : last + 1])  # with the one that ends it
         if len(rows):
             self._add_rows(rows, phases[first:last])
         if self.ended:
@@ -216,7 +217,6 @@ class RunMetrics:
         for metric in self._further.values():
             metric.add(rows, position)
         self._currents.add(rows)
-        self._faults.look(rows)
         timed = rows[rows['has_measurement']]
         if len(timed):
             if self._timing.latest is None:
