@@ -69,9 +69,10 @@ def test_what_is_refused_is_named_and_stays_as_it_was(plant: Any) -> None:
     assert plant(GetParameters, 'get_parameters', names=names).values == before
 
 
-def test_a_whole_number_is_a_double_s(plant: Any) -> None:
-    given = [of('answer_timeout', integer_value=9)]
-    (result,) = plant(SetParameters, 'set_parameters', parameters=given).results
+@pytest.mark.parametrize('given', [{'integer_value': 9}, {'string_value': '9e0'}])
+def test_a_double_is_taken_as_in_a_file(plant: Any, given: dict[str, Any]) -> None:
+    parameters = [of('answer_timeout', **given)]
+    (result,) = plant(SetParameters, 'set_parameters', parameters=parameters).results
     assert result.successful
     (value,) = plant(GetParameters, 'get_parameters', names=['answer_timeout']).values
     assert value == of('answer_timeout', double_value=9.0).value

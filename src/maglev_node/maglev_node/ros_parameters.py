@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import sys
 from collections.abc import Container, Iterable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any, TypeVar
 
 from rcl_interfaces.msg import (
@@ -70,8 +71,17 @@ class ParameterService(parameter_service.ParameterService):
             raise ParameterError(f"parameter '{name}' has a value of no type") from error
         if spec is None:
             return parameter
-        value = spec.check(parameter.value)
+        value = spec.check(_numbers(parameter.value) if spec.kind is float else parameter.value)
         return Parameter(name, _type(spec), list(value) if spec.array else value)
+
+
+def _numbers(given: Any) -> Any:
+    """``1e-05`` is a number in parameter files, but to ``ros2 param set`` and ``load`` a text."""
+    if isinstance(given, list):
+        return [_numbers(each) for each in given]
+    with suppress(ValueError):
+        return float(given) if isinstance(given, str) else given
+    return given
 
 
 def _type(spec: Spec) -> Parameter.Type:
