@@ -15,3 +15,8 @@ class Phase(enum.IntEnum):
     STEP = 4  # measured: step response towards the target counts
     LAND = 5
     END = 6  # landed, the run is over
+
+
+def phase_name(number: int) -> str:
+    """What a phase is called; the number itself where it is none of ours."""
+    return Phase(number).name if number <= max(Phase) else str(number)

@@ -39,19 +39,20 @@ def test_tracking_errors(run: Any, records: dict[str, Records]) -> None:
 
 
 @pytest.mark.parametrize('mode', [Mode.LANDING, Mode.FAULT])
-def test_a_run_that_its_controller_left_fails(records: dict[str, Records], mode: Mode) -> None:
+def test_a_run_that_its_controller_left_fails(
+    run: Any, records: dict[str, Records], mode: Mode
+) -> None:
     states = records['controller'] = records['controller'].copy()
     states['mode'] = Mode.REGULATING
     end = records['reference']['sequence'][records['reference']['phase'] == Phase.END].min()
     states['mode'][states['sequence'] > end] = mode  # after the run it may do what it likes
     assert figures(records)['verdict'] == 'pass'
-    for left in (end, end - 70):
+    for left in (end, end - 70, 600):
         states['mode'][states['sequence'] >= left] = mode
         found = figures(records)
         assert found['verdict'] == 'fail'
-        assert found['reasons'] == [
-            f'from sample {left} on the controller landed by itself, or had given up'
-        ]
+        where = f'{mode.name} from sample {left} on, in {Phase(run.phase[left]).name}'
+        assert found['reasons'] == [f'the controller left the run: {where}']
 
 
 def test_errors_on_the_encoders_own_scales_and_the_verdict_by_them(

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from maglev_model.axes import AXES
-from maglev_model.phases import Phase
+from maglev_model.phases import phase_name
 from maglev_monitor.metrics.decoding import Records
 from maglev_monitor.metrics.derived import positions
 from maglev_monitor.metrics.run_parameters import RunParameters
@@ -43,8 +43,7 @@ class Progress:
         factor = 0.0
         if before is not None and now > before[1]:
             factor = (sequence - before[0]) * self._sample_time / (now - before[1])
-        name = Phase(phase).name if phase <= max(Phase) else str(phase)
-        errors = self._errors()
+        name, errors = phase_name(phase), self._errors()
         self._values = {
             'stage_time': f'{stage_time:.3f}',
             'real_time_factor': f'{factor:.2f}',

@@ -4,12 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
-from maglev_model.modes import Mode
-from maglev_monitor.metrics.decoding import Records
-
-_GONE = (Mode.LANDING, Mode.FAULT)
 _ROUNDING = 1  # of a stamp to whole nanoseconds
 _MOST = 100  # errors of a node that are kept until it is known when the run began
 
@@ -32,9 +26,6 @@ class Faults:
         self._sample_time = sample_time
         self._begin: Instant | None = None
         self._reports: dict[str, list[tuple[int, str]]] = {}
-        self.left: int | None = None
-        """The first sample of the run that the controller does not regulate: it lands by itself,
-        or has given up. It reports that once a second, and the run may have ended by then."""
 
     def add(self, stamp: int, node: str, message: str) -> None:
         """Take an error a node reported at a time [ns since the epoch]."""
@@ -46,15 +37,6 @@ class Faults:
         self._begin = begin
         for node in self._reports:
             self._tidy(node)
-
-    def look(self, rows: Records) -> None:
-        """Take the run's next rows of :data:`.joiner.ROW`, in the end with the first of END.
-
-        That one may lie where the controller landed, when the reference was late to tell of it.
-        """
-        gone = rows['sequence'][np.isin(rows['mode'], _GONE)]
-        if self.left is None and len(gone):
-            self.left = int(gone[0])
 
     def until(self, end: Instant | None) -> list[str]:
         """The errors up to the end of the run, None while it lasts."""

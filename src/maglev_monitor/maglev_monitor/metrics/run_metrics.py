@@ -23,6 +23,7 @@ from maglev_monitor.metrics.arrivals import Arrivals
 from maglev_monitor.metrics.decoding import Records
 from maglev_monitor.metrics.derived import SOURCES, phase_currents, positions
 from maglev_monitor.metrics.faults import Faults, Instant
+from maglev_monitor.metrics.following import Following
 from maglev_monitor.metrics.holes import Holes
 from maglev_monitor.metrics.run_parameters import RunParameters
 from maglev_monitor.metrics.step_response import StepTracker
@@ -84,6 +85,7 @@ class RunMetrics:
             for name in run.metrics.modules
         }
         self._timing = _Timing()
+        self._following = Following()
         self._faults = Faults(run.metrics.sample_time)
         self._end: Instant | None = None
 
@@ -120,7 +122,8 @@ class RunMetrics:
             self.ended = True
             last = first + int(ends[0])
         rows = block[first:last]
-        self._faults.look(block[first : last + 1])  # with the one that ends it
+        following = slice(first, last + 1)  # with the sample that ends it
+        self._following.add(block[following], phases[following])
         if len(rows):
             self._add_rows(rows, phases[first:last])
         if self.ended:
@@ -158,11 +161,11 @@ class RunMetrics:
             'currents': self._currents.result(),
             'timing': self._timing.result(sample_time),
             'faults': self._faults.until(self._end),
+            'left': self._following.left,
         }
         if self._further:
             figures['further'] = {name: one.result() for name, one in self._further.items()}
-        judged = verdict(figures, run, whole=self._whole, ended=self.ended, left=self._faults.left)
-        return {**figures, **judged}
+        return {**figures, **verdict(figures, run, whole=self._whole, ended=self.ended)}
 
     def _step_results(self, source: int) -> list[dict[str, Any]]:
         return [entry for step in self._steps for entry in step.results(source)]

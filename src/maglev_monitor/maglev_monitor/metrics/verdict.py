@@ -15,7 +15,7 @@ _NANOSECOND = 1e-9  # to which the stage rounds [s]
 
 
 def verdict(
-    figures: Mapping[str, Any], run: RunParameters, *, whole: bool, ended: bool, left: int | None
+    figures: Mapping[str, Any], run: RunParameters, *, whole: bool, ended: bool
 ) -> dict[str, Any]:
     """The last part of ``metrics.json``: verdict, its reasons and the limits that were checked.
 
@@ -26,12 +26,12 @@ def verdict(
     :param run: with the limits and the counts.
     :param whole: whether it is known from its lift-off on; ``ended``: whether it reached its end.
         Otherwise it is ``incomplete`` or a failure.
-    :param left: the sample from which on the controller landed by itself, or had given up.
     """
     limits = run.limits
     reasons = [f'fault in {fault}' for fault in figures['faults']]
-    if left is not None:
-        reasons.append(f'from sample {left} on the controller landed by itself, or had given up')
+    if left := figures['left']:
+        where = f'{left["mode"]} from sample {left["sample"]} on, in {left["phase"]}'
+        reasons.append(f'the controller left the run: {where}')
     failed = bool(reasons)
     reasons += [*_axis_reasons(figures, run), *_step_reasons(figures, limits)]
     reasons += [*_sample_time_reason(figures, run), *_other_reasons(figures, limits)]

@@ -12,7 +12,7 @@ import numpy as np
 from maglev_model.axes import AXES, FloatArray
 from maglev_model.geometry import outputs_of_gaps
 from maglev_model.modes import Mode
-from maglev_model.phases import Phase
+from maglev_model.phases import phase_name
 from maglev_monitor.metrics.decoding import Records
 from maglev_view.frames import Vector, platen_pose
 from maglev_view.parameters import WebParameters
@@ -80,8 +80,7 @@ class Live:
         elif key == 'plant':
             self.load = last['thermal_load'].copy()
         elif key == 'reference':
-            phase = int(last['phase'])
-            self.phase = Phase(phase).name if phase <= max(Phase) else str(phase)
+            self.phase = phase_name(int(last['phase']))
 
     def told(self, node: str, level: int, text: str, values: Mapping[str, str]) -> None:
         """Take what a node says of itself."""
