@@ -9,21 +9,20 @@ from __future__ import annotations
 
 import copy
 import itertools
-from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from maglev_model.axes import AXES
 from maglev_model.phases import Phase
-from maglev_model.plugins import find_plugin
 from maglev_model.wire import TOPIC_TYPES
 from maglev_monitor.metrics.arrivals import Arrivals
 from maglev_monitor.metrics.decoding import Records
 from maglev_monitor.metrics.derived import SOURCES, phase_currents, positions
 from maglev_monitor.metrics.faults import Faults, Instant
 from maglev_monitor.metrics.following import Following
+from maglev_monitor.metrics.further import Further
 from maglev_monitor.metrics.holes import Holes
 from maglev_monitor.metrics.run_parameters import RunParameters
 from maglev_monitor.metrics.step_response import StepTracker
@@ -39,23 +38,6 @@ _OPTIONAL = ('controller', 'plant')  # a stage or controller may do without
 _TICK_RESOLUTION = 1e-6  # of the tick histogram [s]
 _TICK_BINS = 200_000
 _RUNNING = (Phase.LIFT_OFF, Phase.HOLD, Phase.TRACK, Phase.STEP, Phase.LAND)
-
-
-class Metric(Protocol):
-    """A further metric, as the function ``metric(run)`` of a module makes it.
-
-    ``metrics.modules`` names the module; what it finds is ``further.MODULE`` of metrics.json.
-    """
-
-    def add(self, rows: Records, position: FloatArray) -> None:
-        """Take the run's next rows (n,) of :data:`.joiner.ROW`, in order.
-
-        ``position`` (n, 3, 5): outputs, true, measured and on the encoders' own scales [m, rad],
-        NaN where unknown.
-        """
-
-    def result(self) -> Mapping[str, float | None]:
-        """Its figures by name, in SI units."""
 
 
 class RunMetrics:
@@ -80,10 +62,7 @@ class RunMetrics:
         self._target: FloatArray | None = None
         self._step: StepTracker | None = None
         self._currents = _Currents(run.machine.pole_pitch)
-        self._further: dict[str, Metric] = {
-            name: find_plugin('metrics.modules', name, ('metric',)).metric(run)
-            for name in run.metrics.modules
-        }
+        self._further = Further(run)
         self._timing = _Timing()
         self._following = Following()
         self._faults = Faults(run.metrics.sample_time)
@@ -163,8 +142,9 @@ class RunMetrics:
             'faults': self._faults.until(self._end),
             'left': self._following.left,
         }
-        if self._further:
-            figures['further'] = {name: one.result() for name, one in self._further.items()}
+        if run.metrics.modules:
+            figures['further'] = self._further.result()
+            figures['further_failed'] = self._further.failed
         return {**figures, **verdict(figures, run, whole=self._whole, ended=self.ended)}
 
     def _step_results(self, source: int) -> list[dict[str, Any]]:
@@ -217,8 +197,7 @@ class RunMetrics:
             rows['sequence'][measured], rows['reference'][measured], position[measured]
         )
         self._add_segments(rows[referenced], position[referenced])
-        for metric in self._further.values():
-            metric.add(rows, position)
+        self._further.add(rows, position)
         self._currents.add(rows)
         timed = rows[rows['has_measurement']]
         if len(timed):
