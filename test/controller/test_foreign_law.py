@@ -136,7 +136,7 @@ def test_an_answer_that_is_none(law_module: types.ModuleType, answer: Any, why: 
 
 def test_a_law_that_cannot_be_made(law_module: types.ModuleType) -> None:
     law_module.make = lambda _: [][0]
-    with pytest.raises(ParameterError, match=rf"'law' is '{NAME}', which cannot be made: IndexErr"):
+    with pytest.raises(ParameterError, match=rf"'law' is '{NAME}', whose 'make' raised IndexErr"):
         Regulator(parameters())
 
 

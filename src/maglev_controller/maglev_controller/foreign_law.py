@@ -11,8 +11,6 @@ from __future__ import annotations
 
 import dataclasses
 import time
-import traceback
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol
 
 import numpy as np
@@ -20,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from maglev_model.axes import AXES, FloatArray
 from maglev_model.parameters import ParameterError, parameter
+from maglev_model.plugins import told
 
 if TYPE_CHECKING:
     from maglev_controller.parameters import ControllerParameters
@@ -94,19 +93,16 @@ class ForeignLaw:
 
     def __init__(
         self,
-        make: Callable[[ControllerParameters], Law],
+        law: Law,
         parameters: ControllerParameters,
         name: str = '',
     ) -> None:
-        """Make the law and ask it once, at rest. Raises ParameterError when that fails."""
+        """Ask the law once, at rest. Raises ParameterError when that fails."""
+        self.law = law
         self.name = name or parameters.law
         self.parameters = parameters
         self.hurried = False
         given = f"parameter 'law' is '{self.name}'"
-        try:
-            self.law = make(parameters)
-        except Exception as error:
-            raise ParameterError(f'{given}, which cannot be made: {_told(error)}') from error
         self.reset()
         rest = np.zeros((5, 5))
         rest[0, 0] = rest[2, 0] = parameters.machine.gap_max
@@ -204,14 +200,4 @@ class ForeignLaw:
     def _fail(self, error: BaseException) -> None:
         if isinstance(error, KeyboardInterrupt):
             raise error
-        self.fault = f'the law {self.name} raised {_told(error)}'
-
-
-def _told(error: BaseException) -> str:
-    """An exception and where it comes from, in a line."""
-    frames = traceback.extract_tb(error.__traceback__)
-    where = (
-        f' ({frames[-1].filename.rpartition("/")[2]}, line {frames[-1].lineno})' if frames else ''
-    )
-    text = str(error).partition('\n')[0]
-    return f'{type(error).__name__}{": " if text else ""}{text}{where}'
+        self.fault = f'the law {self.name} raised {told(error)}'

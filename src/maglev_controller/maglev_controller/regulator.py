@@ -106,12 +106,11 @@ class Regulator:
         Raises ``ParameterError`` when that cannot be made.
         """
         given, make = self._given, find_law(self.parameters.law).make
+        self.foreign: ForeignLaw | None = None
         if given is not None:
-            self.foreign: ForeignLaw | None = ForeignLaw(
-                lambda _: given, self.parameters, type(given).__name__
-            )
-        else:
-            self.foreign = None if make is None else ForeignLaw(make, self.parameters)
+            self.foreign = ForeignLaw(given, self.parameters, type(given).__name__)
+        elif make is not None:
+            self.foreign = ForeignLaw(make(self.parameters), self.parameters)
         if self.foreign is not None:
             warm_up(self._arrays, self.foreign.gives_currents)
 

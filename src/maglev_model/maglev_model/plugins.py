@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
 import pkgutil
-from collections.abc import Sequence
+import traceback
+from collections.abc import Callable, Sequence
 from types import ModuleType
+from typing import Any
 
 from maglev_model.parameters import ParameterError
 
@@ -40,3 +43,45 @@ def find_plugin(
         if not callable(getattr(module, function, None)):
             raise ParameterError(f"{given}, a module without the function '{function}'")
     return module
+
+
+def plugin_function(
+    parameter: str, name: str, function: str, package: str = '', gives: type = object
+) -> Callable[..., Any]:
+    """A ``function`` of the module that :func:`find_plugin` finds.
+
+    Of anybody's module, it raises nothing but :class:`ParameterError`: with what went wrong and
+    where, or where the result is none of what it ``gives``.
+    """
+    called: Callable[..., Any] = getattr(
+        find_plugin(parameter, name, (function,), package), function
+    )
+    if '.' not in name:
+        return called
+
+    @functools.wraps(called)
+    def checked(*given: Any) -> Any:
+        whose = f"parameter '{parameter}' is '{name}', whose '{function}'"
+        try:
+            found = called(*given)
+        except ParameterError:
+            raise
+        except Exception as error:
+            raise ParameterError(f'{whose} raised {told(error)}') from error
+        if not isinstance(found, gives):
+            raise ParameterError(
+                f'{whose} returned {type(found).__name__}: it must be {gives.__name__}'
+            )
+        return found
+
+    return checked
+
+
+def told(error: BaseException) -> str:
+    """An exception in a line, and where in what was called it comes from."""
+    frames = traceback.extract_tb(error.__traceback__)[1:]
+    where = (
+        f' ({frames[-1].filename.rpartition("/")[2]}, line {frames[-1].lineno})' if frames else ''
+    )
+    text = str(error).partition('\n')[0]
+    return f'{type(error).__name__}{": " if text else ""}{text}{where}'

@@ -7,6 +7,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from maglev_model.axes import FloatArray
+from maglev_model.parameters import ParameterError
+from maglev_model.plugins import told
 from maglev_model.quintic import evaluate_quintic, quintic_coefficients
 
 
@@ -37,6 +39,28 @@ class Motion(Protocol):
     def evaluate(self, time: FloatArray) -> Kinematics:
         """Position, velocity and acceleration at each time."""
         ...
+
+
+class Checked:
+    """A motion of somebody else's, who is ``given`` by a parameter: it gives what it must."""
+
+    def __init__(self, motion: Motion, given: str) -> None:
+        self._motion = motion
+        self._given = given
+
+    def evaluate(self, time: FloatArray) -> Kinematics:
+        """What the motion gives; raises ParameterError where that is none."""
+        try:
+            found = Kinematics(*map(np.asarray, self._motion.evaluate(time)))
+        except Exception as error:
+            raise ParameterError(f'{self._given}, whose motion raised {told(error)}') from error
+        for name, part in zip(Kinematics._fields, found, strict=True):
+            if part.shape != (len(time), 5) or part.dtype.kind not in 'fi':
+                raise ParameterError(
+                    f'{self._given}, whose motion gives a {name} of shape {part.shape} and type '
+                    f'{part.dtype} at {len(time)} times: it must be {(len(time), 5)}, of floats'
+                )
+        return found
 
 
 def state_at(motion: Motion, time: float) -> State:

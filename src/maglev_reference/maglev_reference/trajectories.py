@@ -8,12 +8,13 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from maglev_model.axes import AXES, UNITS, FloatArray
-from maglev_model.plugins import find_plugin
+from maglev_model.parameters import ParameterError
+from maglev_model.plugins import plugin_function
 from maglev_model.quintic import minimum_jerk_time
 from maglev_reference.check import UnreachableError
 from maglev_reference.curves import Chirp, Helix, Sinusoids, Square
 from maglev_reference.fastest import Fastest, FastestMoves
-from maglev_reference.motion import Kinematics, Motion, Quintic, Stand, State
+from maglev_reference.motion import Checked, Kinematics, Motion, Quintic, Stand, State
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.waypoints import Waypoints
 
@@ -90,9 +91,18 @@ def course(parameters: ReferenceParameters) -> Course:
         case 'hold':
             return Course(Stand(home))
         case name:
-            module = find_plugin('trajectory', name, ('course',))
-            own_course: Course = module.course(parameters)
-            return own_course
+            own: Course = plugin_function('trajectory', name, 'course', gives=Course)(parameters)
+            return _checked(own, f"parameter 'trajectory' is '{name}'")
+
+
+def _checked(own: Course, given: str) -> Course:
+    """A course from outside, which a parameter has ``given``."""
+    for name, time in (('period', own.period), ('length', own.length)):
+        if time is not None and not (isinstance(time, float | int) and 0.0 < time < math.inf):
+            raise ParameterError(
+                f'{given}, whose {name} is {time!r}: it must be above 0 s, or None'
+            )
+    return own._replace(motion=Checked(own.motion, given))
 
 
 def _lined(sinusoids: Sinusoids) -> Course:

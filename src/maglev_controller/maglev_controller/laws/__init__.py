@@ -26,13 +26,14 @@ To add another:
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable
 
 from maglev_controller.checks import check_currents, check_foreign, check_learning, check_machine
 from maglev_controller.design.axis_design import AxisDesign
 from maglev_controller.foreign_law import Law
 from maglev_controller.parameters import ControllerParameters
-from maglev_model.plugins import find_plugin, names_in
+from maglev_model.plugins import find_plugin, names_in, plugin_function
 
 _LANDS = 'output_regulator'
 
@@ -62,13 +63,15 @@ def find_law(name: str) -> ControlLaw:
     Raises :class:`ParameterError` when there is none, or when its module cannot be used.
     """
     module = find_plugin('law', name, (), __name__)
+    function = functools.partial(plugin_function, 'law', name, package=__name__)
     references = getattr(module, 'REFERENCES', ())
     if callable(getattr(module, 'make', None)):
-        check = getattr(module, 'check', _check_nothing)
-        return ControlLaw(check, find_law(_LANDS).design, False, references, module.make)
-    find_plugin('law', name, ('check', 'design'), __name__)
+        check = function('check') if hasattr(module, 'check') else _check_nothing
+        lands = find_law(_LANDS).design
+        return ControlLaw(check, lands, False, references, function('make'))
+    check, design = function('check'), function('design', gives=AxisDesign)
     has_crossover = getattr(module, 'HAS_CROSSOVER', False)
-    return ControlLaw(module.check, module.design, has_crossover, references)
+    return ControlLaw(check, design, has_crossover, references)
 
 
 def _check_nothing(_: ControllerParameters) -> None:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_model.parameters import ParameterError
-from maglev_model.plugins import find_plugin
+from maglev_model.plugins import plugin_function
 
 CountArray = NDArray[np.int32]
 VoltArray = NDArray[np.float64]
@@ -119,8 +119,8 @@ def make_driver(parameters: BridgeParameters, realtime: bool) -> Driver:
     Raises ParameterError when there is none of that name, or what a driver needs is missing from
     it: that is not to be found out by a landing.
     """
-    module = find_plugin('driver', parameters.driver, ('make',), __name__)
-    driver: Driver = module.make(parameters, realtime)
+    make = plugin_function('driver', parameters.driver, 'make', __name__)
+    driver: Driver = make(parameters, realtime)
     missing = [name for name in _NEEDED if not hasattr(driver, name)]
     if missing:
         raise ParameterError(
