@@ -78,6 +78,7 @@ def test_simulate_runs_the_plant_under_a_function() -> None:
             "'trajectory' is a dict, it takes a name such as 'ellipse'",
         ),
         (lambda: maglev.simulate(print, math.nan), ValueError, "'duration' is nan s"),
+        (lambda: maglev.simulate(lambda _: ([0.0] * 4,) * 3, 1.0), ValueError, 'expected 2'),
         (
             lambda: maglev.fly('ellipse', plant=maglev.ControllerParameters()),  # type: ignore[arg-type]
             TypeError,

@@ -245,5 +245,6 @@ def simulate(
         run.measured[k, 4:] = sample.x, sample.z
         run.direct_current[k] = stage.direct_current
         run.quadrature_current[k] = stage.quadrature_current
-        stage.write(*law(sample))
+        direct, quadrature = law(sample)
+        stage.write(direct, quadrature)
     return run

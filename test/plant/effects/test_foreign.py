@@ -89,11 +89,20 @@ def test_what_is_no_model_is_refused_by_its_name(group: str, module: str) -> Non
         ideal_stage(**{f'effects__{group}__model': 'math.floor'})
 
 
-def test_one_that_does_not_compile_is_refused(module: str, tmp_path: Path) -> None:
-    broken = 'def force(velocity, level, step, memory):\n    return open("/dev/null")\n'
+@pytest.mark.parametrize(
+    ('text', 'why'),
+    [
+        ('(velocity, level, step, memory):\n    return open("/dev/null")', "name 'open'"),
+        ('(velocity, level):\n    return level', 'TypeError: too many positional arguments'),
+        ('(velocity, level, step, memory):\n    memory[0] = 1.0', 'No conversion from none to'),
+    ],
+)
+def test_one_that_does_not_compile_is_refused(
+    text: str, why: str, module: str, tmp_path: Path
+) -> None:
     package = module.partition('.')[0]
-    (tmp_path / package / 'broken.py').write_text(broken)
-    with pytest.raises(ParameterError, match='cannot be compiled'):
+    (tmp_path / package / 'broken.py').write_text(f'def force{text}\n')
+    with pytest.raises(ParameterError, match=f"whose 'force' cannot be compiled: .*{why}"):
         ideal_stage(effects__friction__model=f'{package}.broken')
 
 

@@ -161,7 +161,8 @@ def _address(
     try:
         compiled = make(model)
     except numba().core.errors.NumbaError as error:
-        reason = str(error).strip().splitlines()[-1]
+        told = (line for line in str(error).splitlines() if not line.startswith('Failed in'))
+        reason = next(told, type(error).__name__)
         raise ParameterError(
             f"{where} '{name}', whose '{function}' cannot be compiled: {reason}"
         ) from error
