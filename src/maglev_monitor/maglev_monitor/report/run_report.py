@@ -54,7 +54,8 @@ def render(analysis: Analysis, replay: str = '') -> str:
             tables.repeatability(result),
         ),
         _steps_tables(result),
-        _limits_table(result['limits']),
+        _further_table(result.get('further', {})),
+        _limits_table(result),
         *render_charts(list(charts(analysis))),
         _changes_table(analysis.changes),
     ]
@@ -140,9 +141,18 @@ def _tables(title: str, heads: Iterable[str], found: Iterable[tuple[str, list[li
     return f'<h2>{title}</h2>' + ''.join(parts) if parts else ''
 
 
-def _limits_table(limits: Mapping[str, Any]) -> str:
+def _further_table(further: Mapping[str, Mapping[str, float | None]]) -> str:
+    rows = [
+        [module, name, '–' if value is None else number(value)]
+        for module, figures in further.items()
+        for name, value in figures.items()
+    ]
+    return '<h2>Further metrics</h2>' + html_table(['module', 'figure', ''], rows) if rows else ''
+
+
+def _limits_table(result: Mapping[str, Any]) -> str:
     rows = []
-    for name, value in limits.items():
+    for name, value in result['limits'].items():
         if isinstance(value, Mapping):
             shown = ', '.join(
                 f'{axis} {angle_or_length(axis, bound)}' for axis, bound in value.items()
@@ -150,7 +160,10 @@ def _limits_table(limits: Mapping[str, Any]) -> str:
         else:
             shown = f'{number(value)} {_LIMITS[name].unit}'.rstrip()
         rows.append([name.replace('_', ' '), shown])
-    return '<h2>Limits</h2>' + html_table(['limit', 'value'], rows) if rows else ''
+    judged = tables.NAMES['own' if result['own_axes'] else result['error_source']]
+    more = ', errors with half a count more' if judged == tables.NAMES['measured'] else ''
+    caption = f'<p class="caption">Errors and steps that are checked: {judged}{more}.</p>'
+    return f'<h2>Limits</h2>{caption}{html_table(["limit", "value"], rows)}' if rows else ''
 
 
 def _changes_table(changes: Sequence[tuple[str, str]]) -> str:

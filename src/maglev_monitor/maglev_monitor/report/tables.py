@@ -25,7 +25,7 @@ REPEATABILITY = {
 
 STEPS = ('from', 'to', 'overshoot', 't_s', 't_enc')
 
-_NAMES = {'true': 'true position', 'own': "encoders' own scales", 'measured': 'as counted'}
+NAMES = {'true': 'true position', 'own': "encoders' own scales", 'measured': 'as counted'}
 _SAME = 1e-9  # what figures may differ by that are shown once [m, rad]
 
 
@@ -38,7 +38,7 @@ def errors(result: Mapping[str, Any]) -> Iterator[tuple[str, list[list[str]]]]:
     for name, axes in shown.items():
         if axes and axes['y']['mean_abs_error'] is not None:
             rows = [[axis, *(micro(axis, axes[axis][key]) for key in ERRORS)] for axis in AXES]
-            yield _NAMES[name], rows
+            yield NAMES[name], rows
 
 
 def steps(result: Mapping[str, Any]) -> Iterator[tuple[str, list[list[str]]]]:
@@ -46,9 +46,9 @@ def steps(result: Mapping[str, Any]) -> Iterator[tuple[str, list[list[str]]]]:
     true = [_step(step) for step in result['steps']]
     own = [_step(step) for step in result['own_steps'] or ()]
     if true:
-        yield _NAMES[result['error_source']], true
+        yield NAMES[result['error_source']], true
     if own and own != true:
-        yield _NAMES['own'], own
+        yield NAMES['own'], own
 
 
 def _step(step: Mapping[str, Any]) -> list[str]:
@@ -65,7 +65,7 @@ def repeatability(result: Mapping[str, Any]) -> Iterator[tuple[str, list[list[st
             [axis, *(micro(axis, found[key]) for key in REPEATABILITY)]
             for axis, found in axes.items()
         ]
-        yield _NAMES[source], rows
+        yield NAMES[source], rows
 
 
 def _same(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
