@@ -7,8 +7,11 @@ import html
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from made_up_run import TOPICS, Encoder, open_bag, write_samples
 
+from maglev_model.phases import Phase
 from maglev_monitor.bag.analysis import analyse
 from maglev_monitor.report import run_report
 
@@ -35,3 +38,28 @@ def test_it_says_whose_errors_are_checked_and_shows_further_metrics(
     assert f'Errors and steps that are checked: {whose}.' in page
     assert '<td>my_stage.effort</td><td>direct_effort</td><td>0.3261</td>' in page
     assert '<td>unknown</td><td>–</td>' in page
+
+
+def test_another_flight_in_the_bag_is_said(
+    tmp_path: Path, run: Any, messages: dict[str, list[bytes]]
+) -> None:
+    encoder, length = Encoder(), len(run)
+    shifted = dataclasses.replace(
+        run,
+        **{
+            column.name: np.concatenate([values := getattr(run, column.name), values])
+            for column in dataclasses.fields(run)
+        },
+    )
+    shifted.stamp[length:] += int(np.ptp(run.stamp)) + 1_000_000
+    both = {key: [encoder.message(shifted, key, n) for n in range(2 * length)] for key in TOPICS}
+    for name, parts, flown in (('one', messages, run), ('two', both, shifted)):
+        writer = open_bag(tmp_path / name)
+        write_samples(writer, flown, parts)
+        writer.close()
+    one, two = analyse(tmp_path / 'one'), analyse(tmp_path / 'two')
+    assert two.result['axes'] == one.result['axes']
+    again = length + int(np.flatnonzero(run.phase == Phase.LIFT_OFF)[0])
+    said = f"'two' goes on with another flight, from sample {again} on: not counted"
+    assert [note for note in two.notes if 'flight' in note] == [said]
+    assert said not in one.notes

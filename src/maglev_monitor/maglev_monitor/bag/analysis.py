@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maglev_model.parameters import DIFFERS, ParameterError
+from maglev_model.phases import Phase
 from maglev_model.progress import Progress
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.reader import Bag, run_folder
 from maglev_monitor.metrics.curves import RunCurves
-from maglev_monitor.metrics.decoding import stage_period
+from maglev_monitor.metrics.decoding import Records, stage_period
 from maglev_monitor.metrics.joiner import Joiner
 from maglev_monitor.metrics.run_metrics import RunMetrics
 from maglev_monitor.metrics.run_parameters import (
@@ -57,16 +59,15 @@ def analyse(path: Path, progress: Progress | None = None) -> Analysis:
         run = dataclasses.replace(run, metrics=dataclasses.replace(run.metrics, modules=()))
         metrics = RunMetrics(run)
     curves, joiner = RunCurves(run), Joiner()
-    for batch in bag.batches():
-        for key, records in batch.samples.items():
-            joiner.add(key, records)
-        for status in batch.diagnostics:
-            if status.level >= FAULT_LEVEL:
-                metrics.add_fault(status.stamp, status.name, status.message)
-        for block in joiner.take():
-            curves.add(metrics.add(block))
-    for block in joiner.finish():
+    again: int | None = None
+    for block in _blocks(bag, joiner, metrics):
         curves.add(metrics.add(block))
+        if again is None and metrics.ended:
+            again = _lift_off(block, joiner.end or 0)
+    if again is not None:
+        notes.append(
+            f"'{bag.path.name}' goes on with another flight, from sample {again} on: not counted"
+        )
     if not metrics.started:
         raise BagError(f"the bag '{bag.path}' holds no run: the reference never left REST")
     result = metrics.result(cut_off=bool(bag.notes))
@@ -74,6 +75,25 @@ def analyse(path: Path, progress: Progress | None = None) -> Analysis:
     return Analysis(
         result, curves, run, metrics.tick_histogram, bag.notes + notes, changes, bag.custom()
     )
+
+
+def _blocks(bag: Bag, joiner: Joiner, metrics: RunMetrics) -> Iterator[Records]:
+    """Joined samples, block by block; errors that nodes report go to ``metrics``."""
+    for batch in bag.batches():
+        for key, records in batch.samples.items():
+            joiner.add(key, records)
+        for status in batch.diagnostics:
+            if status.level >= FAULT_LEVEL:
+                metrics.add_fault(status.stamp, status.name, status.message)
+        yield from joiner.take()
+    yield from joiner.finish()
+
+
+def _lift_off(block: Records, after: int) -> int | None:
+    """The first sample of a lift-off after a run's end."""
+    lifts = block['has_reference'] & (block['phase'] == Phase.LIFT_OFF)
+    samples = block['sequence'][lifts & (block['sequence'] > after)]
+    return int(samples[0]) if len(samples) else None
 
 
 def _changes(folder: Path) -> list[tuple[str, str]]:
