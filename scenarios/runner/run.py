@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from runner.console import GREEN, complain, say, write
+from runner.console import GREEN, complain, quiet, say, write
 from runner.folder import make_folder, say_where, why_unwritable
 from runner.graph import START_ORDER, STOP_ORDER, Flight
 from runner.logs import NodeLog
@@ -112,7 +112,12 @@ class Run:
         if replay:
             self._replay(replay)
         reported = self._report(analyze)
-        return clean and reported and figures(self._flight).get('verdict') == 'pass'
+        found = figures(self._flight)
+        passed = found.get('verdict') == 'pass'
+        if quiet() and not passed:  # else the monitor has told it
+            for reason in found.get('reasons', ()):
+                self._complain(reason)
+        return clean and reported and passed
 
     def _watch(self) -> bool:
         while not self._signals.code:

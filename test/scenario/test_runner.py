@@ -237,7 +237,7 @@ def test_quietly_only_what_is_wrong_is_said(tree: Tree) -> None:
     code, output = tree.finish('--out', f'{tree.out}-2', '--quiet', script='ellipse')
     assert code == 1
     assert 'ellipse: controller: warning: ' in output
-    assert output.endswith(f'ellipse: FAILED, see {tree.out}-2\n')
+    assert output.endswith(f'ellipse: too far off\nellipse: FAILED, see {tree.out}-2\n')
     assert ' um' not in output
 
 

@@ -55,7 +55,7 @@ case $what in
     done
     echo 'INFO 1790000000.1 recording'
     echo 'y 3.0 um'
-    echo "{\"verdict\": \"$what\"}" >"$out/metrics.json"
+    echo "{\"verdict\": \"$what\", \"reasons\": [\"too far off\"]}" >"$out/metrics.json"
     ;;
 esac
 while :; do sleep 0.02; done
