@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 import sys
 from pathlib import Path
@@ -22,8 +23,7 @@ _PACKAGES = {'watchers': 'maglev_monitor', 'web': 'maglev_view'}
 
 def text_value(name: str, text: str) -> str:
     """A parameter of any text for ``-p``, whose values are read as YAML."""
-    quoted = text.replace("'", "''")
-    return f"{name}:='{quoted}'"
+    return f'{name}:={json.dumps(text, ensure_ascii=False)}'
 
 
 class Scenario(NamedTuple):

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import pytest
+import yaml
 from stand_ins import NODES, ROOT, Tree
 
 from maglev_model.parameters import read_argument
 from runner import overlays
+from runner.graph import text_value
 
 WATCHING = ('monitor', 'recorder')
 WATCHERS = "watchers:=['monitor','recorder']"
@@ -24,15 +26,15 @@ def test_the_nodes_get_their_parameters(tree: Tree) -> None:
         assert tree.files(node)[0] == 'params/machine.yaml'
         assert tree.files(node)[-3:] == over
         if node != 'watchers':
-            assert f"effective_parameters:='{tree.out}/params/{node}.yaml'" in tree.arguments(node)
+            assert f'effective_parameters:="{tree.out}/params/{node}.yaml"' in tree.arguments(node)
     assert {'mode:=realtime', WATCHERS} <= set(tree.arguments('plant'))
     reference = tree.arguments('reference')
     assert {'duration:=3.0', 'autostart:=true', WATCHERS, 'lead:=128'} <= set(reference)
     watchers = tree.arguments('watchers')
     assert {
-        *(f"monitor:output:='{tree.out}/metrics.json'", f"recorder:output:='{tree.out}/bag'"),
+        *(f'monitor:output:="{tree.out}/metrics.json"', f'recorder:output:="{tree.out}/bag"'),
         *('monitor:scenario:=ellipse', 'monitor:stage:=plant', 'monitor:mode:=realtime'),
-        *(f"{w}:effective_parameters:='{tree.out}/params/{w}.yaml'" for w in WATCHING),
+        *(f'{w}:effective_parameters:="{tree.out}/params/{w}.yaml"' for w in WATCHING),
     } <= set(watchers)
 
 
@@ -120,6 +122,12 @@ def test_what_is_wrong_is_said_before_the_set_up_where_there_is_a_python(tree: T
     assert tree.run('--mode', 'fast') == (70, 'set-up\n')
 
 
+@pytest.mark.parametrize('text', ["x'y", 'x"y', 'x\\ny', 'a\nb', 'ü 😀', '$HOME', '~', ' '])
+def test_any_text_reaches_the_nodes(text: str) -> None:
+    name, _, value = text_value('output', text).partition(':=')
+    assert (name, yaml.safe_load(value)) == ('output', text)
+
+
 def test_a_trajectory_is_chosen_by_name_or_file(tree: Tree) -> None:
     tree.parameters('params/scenario_file.yaml')
     code, output = tree.finish('ellipse', '--out', str(tree.out), script='trajectory')
@@ -131,7 +139,7 @@ def test_a_trajectory_is_chosen_by_name_or_file(tree: Tree) -> None:
     code, output = tree.finish(path.name, '--out', second, '--duration', '3', script='trajectory')
     assert code == 0, output
     arguments = tree.arguments('reference')
-    assert f"file.path:='{tree.path}/a path''s.csv'" in arguments
+    assert f'file.path:="{tree.path}/a path\'s.csv"' in arguments
     assert 'duration:=3.0' in arguments
     assert 'params/scenario_file.yaml' in tree.files('reference')
 

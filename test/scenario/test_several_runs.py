@@ -34,7 +34,7 @@ def tables(tree: Tree, *options: str) -> tuple[int, str]:
 def flown(tree: Tree) -> list[str]:
     """The runs that began, by their folders within ``out``."""
     return [
-        word.removeprefix(f"recorder:output:='{tree.out}/").removesuffix("/bag'")
+        word.removeprefix(f'recorder:output:="{tree.out}/').removesuffix('/bag"')
         for line in tree.history('watchers')
         for word in line.split()
         if word.startswith('recorder:output:=')

@@ -25,7 +25,7 @@ def test_what_is_started(tree: Tree, options: tuple[str, ...], expected: set[str
     assert set(tree.started()) & {'view', 'web'} == expected
     for view in expected:
         words = tree.arguments(view)
-        assert f"effective_parameters:='{tree.out}/params/{view}.yaml'" in words
+        assert f'effective_parameters:="{tree.out}/params/{view}.yaml"' in words
         assert '__ns:=/lab' in words
     assert "watchers:=['monitor','recorder']" in tree.arguments('plant')
     assert tree.alive() == []

@@ -20,9 +20,9 @@ NODES = ('watchers', 'plant', 'controller', 'reference', 'view')
 STAND_IN = r"""#!/usr/bin/env bash
 name=${0##*/} tree=@TREE@ out='' what=''
 for word; do
-  [[ $word != *effective_parameters:=* ]] || out=${word#*:=\'} out=${out%/params/*}
+  [[ $word != *effective_parameters:=* ]] || out=${word#*:=\"} out=${out%/params/*}
 done
-out=${out//\'\'/\'}
+out=${out//'\"'/\"}
 echo "$name $*" >>"$tree/history"
 printf '%s\n' "$@" >"$tree/arguments/$name"
 for file in "$tree/behaviour/$name@${out##*/}" "$tree/behaviour/$name"; do
