@@ -89,14 +89,14 @@ def one_of(*choices: str) -> Check:
 def seconds(name: str, value: str) -> str:
     """A duration above 0 [s], as ROS reads a double: with a point."""
     if not re.fullmatch(r'[0-9]+\.?[0-9]*', value) or not re.search('[1-9]', value):
-        raise WrongUseError(f"{name} is '{value}', it must be a number of seconds above 0")
+        raise WrongUseError(f"{name} is '{value}', it must be seconds above 0, as 2.5")
     return f'{value}0' if '.' in value else f'{value}.0'
 
 
 def whole(name: str, value: str) -> str:
     """A whole number, 0 or above."""
     if not re.fullmatch('[0-9]+', value):
-        raise WrongUseError(f"{name} is '{value}', it must be a whole number")
+        raise WrongUseError(f"{name} is '{value}', it must be a whole number of at least 0")
     return value
 
 

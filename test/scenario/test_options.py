@@ -7,7 +7,7 @@ import yaml
 from stand_ins import NODES, ROOT, Tree
 
 from maglev_model.parameters import read_argument
-from runner import overlays
+from runner import options, overlays
 from runner.graph import text_value
 
 WATCHING = ('monitor', 'recorder')
@@ -66,7 +66,8 @@ def test_without_a_machine_file_each_node_starts_with_its_own(tree: Tree) -> Non
         (['ellipse'], "unknown option 'ellipse'"),
         (['--mode', 'fast'], "--mode is 'fast', it must be one of: lockstep realtime"),
         (['--stage=model'], "--stage is 'model', it must be one of: plant hw_bridge"),
-        (['--duration', 'long'], "--duration is 'long', it must be a number of seconds above 0"),
+        (['--duration', 'long'], "--duration is 'long', it must be seconds above 0, as 2.5"),
+        (['--duration', '1e3'], "--duration is '1e3', it must be seconds above 0, as 2.5"),
         (['--duration', '-1'], "--duration is '-1'"),
         (['--duration', '0'], "--duration is '0'"),
         (['--duration'], '--duration needs a value'),
@@ -120,6 +121,11 @@ def test_what_is_wrong_is_said_before_the_set_up_where_there_is_a_python(tree: T
     assert tree.run() == (70, 'set-up\n')
     tree.script(tree.path / 'bin' / 'python3', '#!/usr/bin/env bash\nexit 1\n')
     assert tree.run('--mode', 'fast') == (70, 'set-up\n')
+
+
+def test_a_whole_number_is_refused_with_its_bound() -> None:
+    with pytest.raises(options.WrongUseError, match=r"seed is '-1', it must be .* of at least 0"):
+        options.whole('--seed', '-1')
 
 
 @pytest.mark.parametrize('text', ["x'y", 'x"y', 'x\\ny', 'a\nb', 'ü 😀', '$HOME', '~', ' '])
