@@ -32,12 +32,11 @@ def verdict(
     if left := figures['left']:
         where = f'{left["mode"]} from sample {left["sample"]} on, in {left["phase"]}'
         reasons.append(f'the controller left the run: {where}')
-    failed = bool(reasons)
     for name, why in figures.get('further_failed', {}).items():
         reasons.append(f'the further metric {name} raised {why}')
     reasons += [*_axis_reasons(figures, run), *_step_reasons(figures, limits)]
     reasons += [*_sample_time_reason(figures, run), *_other_reasons(figures, limits)]
-    if failed or (whole and ended and reasons):
+    if figures['faults'] or (whole and ended and reasons):
         word = 'fail'
     else:
         word = 'pass' if whole and ended else 'incomplete'
