@@ -57,6 +57,7 @@ def samples(observer: Observer, count: int) -> None:
 
 def idles(observer: Observer) -> bool:
     """Whether the loop goes on, and takes no more samples than it must while nothing shall move."""
+    observer.wait(lambda: observer.newest(MEASUREMENT) is not None)
     first, begun = observer.newest(MEASUREMENT).sequence, time.monotonic()
     observer.serve(2.0)
     rate: float = (observer.newest(MEASUREMENT).sequence - first) / (time.monotonic() - begun)
