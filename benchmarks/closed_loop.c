@@ -117,8 +117,8 @@ static int amplifiers(Stage *s, Machine *m) {
   }
   for (int k = 0; k < 4; k++) {
     double i_d = s->command[k], i_q = s->command[4 + k];
-    double alpha = s->dq_scale * (i_d * c[k % 2] - i_q * n[k % 2]);
-    double beta = s->dq_scale * (i_d * n[k % 2] + i_q * c[k % 2]);
+    double alpha = i_d * c[k % 2] - i_q * n[k % 2];
+    double beta = i_d * n[k % 2] + i_q * c[k % 2];
     met |= phase(s, 3 * k, alpha);
     met |= phase(s, 3 * k + 1, -0.5 * alpha + 0.5 * sqrt(3.0) * beta);
     met |= phase(s, 3 * k + 2, -0.5 * alpha - 0.5 * sqrt(3.0) * beta);

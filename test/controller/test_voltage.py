@@ -34,13 +34,14 @@ def test_28_volts_carry_the_ellipse_and_are_not_asked_for_more() -> None:
     assert steps < 28.0 * PERIOD / 0.045 * 1.2
 
 
-def flown_currents(law: dict[str, object]) -> tuple[np.ndarray, np.ndarray]:
+def flown_currents(law: dict[str, object], scaling: str) -> tuple[np.ndarray, np.ndarray]:
     """Currents asked for and those that flow in the windings when the sample is over (n, 8) [A]."""
     references = ellipse(1.5, 0.010, PERIOD, grow=0.5)
-    stage = SimulatedStage(
-        build(PlantParameters, {'initial.position': tuple(references.position[0]), **PLANT})
-    )
-    regulator, answer = Regulator(build(ControllerParameters, law)), np.zeros((2, 4))
+    machine = {'machine.dq_scaling': scaling}
+    start = {'initial.position': tuple(references.position[0])}
+    stage = SimulatedStage(build(PlantParameters, {**start, **machine, **PLANT}))
+    regulator = Regulator(build(ControllerParameters, {**law, **machine}))
+    answer = np.zeros((2, 4))
     asked, flowing = [], []
     for wanted in zip(*references, strict=True):
         reading = stage.read()
@@ -51,11 +52,12 @@ def flown_currents(law: dict[str, object]) -> tuple[np.ndarray, np.ndarray]:
     return np.array(asked)[50:-1], np.array(flowing)[51:]
 
 
-def test_what_is_asked_for_flows_in_the_windings() -> None:
+@pytest.mark.parametrize('scaling', ['amplitude', 'rms'])
+def test_what_is_asked_for_flows_in_the_windings(scaling: str) -> None:
     """Within what the angle turns by in a sample; a law that does not know the rail misses it."""
     missed = {}
     for voltage in (0.0, 28.0):
-        asked, flowing = flown_currents({'winding.voltage': voltage})
+        asked, flowing = flown_currents({'winding.voltage': voltage}, scaling)
         missed[voltage] = np.abs(flowing - asked).max(axis=1)
     assert missed[28.0].max() < 0.02
     assert missed[0.0].max() > 0.1

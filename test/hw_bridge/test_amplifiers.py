@@ -43,15 +43,13 @@ def amplifiers(**overrides: object) -> Amplifiers:
 
 
 @settings(max_examples=80)
-@given(i_d=FOUR, i_q=FOUR, x=PLACE, z=PLACE, scaling=st.sampled_from(['amplitude', 'rms']))
+@given(i_d=FOUR, i_q=FOUR, x=PLACE, z=PLACE)
 def test_volts_to_currents_to_dq_and_back(
-    i_d: np.ndarray, i_q: np.ndarray, x: float, z: float, scaling: str
+    i_d: np.ndarray, i_q: np.ndarray, x: float, z: float
 ) -> None:
-    unit = Amplifiers(build(BridgeParameters, {**WIRED, 'commutation.dq_scaling': scaling}))
+    unit = Amplifiers(build(BridgeParameters, WIRED))
     code, _ = unit.drive(i_d, i_q, x, z)
-    if code != FINE:
-        assert scaling == 'rms'
-        return
+    assert code == FINE
     current = (unit.volts - np.array(ZERO)) * np.array(GAIN) * np.array(SIGN)
     if np.max(np.abs(unit.arrays.wanted)) > 7.0:
         return
@@ -64,7 +62,7 @@ def test_volts_to_currents_to_dq_and_back(
             / 3.0
             * sum(phase * np.exp(2j * math.pi * k / 3.0) for k, phase in enumerate(phases))
         )
-        back = turned * np.exp(-1j * angle) / (math.sqrt(2.0) if scaling == 'rms' else 1.0)
+        back = turned * np.exp(-1j * angle)
         assert (back.real, back.imag) == pytest.approx((i_d[motor], i_q[motor]), abs=1e-12)
 
 
@@ -107,7 +105,7 @@ def test_a_bad_command_changes_nothing(value: float, code: int) -> None:
 
 
 def test_a_phase_current_that_must_not_be_asked_for() -> None:
-    unit = amplifiers(commutation__dq_scaling='rms')
+    unit = amplifiers(fault__over_current=8.9)
     code, phase = unit.drive(np.array([0.0, 0.0, 9.0, 0.0]), np.zeros(4), 0.0, 0.0)
     assert (code, phase) == (OVER_CURRENT, 6)
 

@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from maglev_model.commutation import (
-    SCALES,
     direct_quadrature_currents,
     electrical_angle,
     phase_currents,
@@ -21,30 +20,29 @@ ANGLE = st.floats(-20.0, 20.0)
 
 
 @settings(max_examples=100)
-@given(i_d=CURRENT, i_q=CURRENT, angle=ANGLE, scale=st.sampled_from(sorted(SCALES.values())))
-def test_there_and_back(i_d: float, i_q: float, angle: float, scale: float) -> None:
-    phases = phase_currents(i_d, i_q, angle, scale)
+@given(i_d=CURRENT, i_q=CURRENT, angle=ANGLE)
+def test_there_and_back(i_d: float, i_q: float, angle: float) -> None:
+    phases = phase_currents(i_d, i_q, angle)
     assert sum(phases) == pytest.approx(0.0, abs=1e-12)
-    back = direct_quadrature_currents(*phases, angle, scale)
+    back = direct_quadrature_currents(*phases, angle)
     assert back == pytest.approx((i_d, i_q), abs=1e-12)
 
 
 @settings(max_examples=50)
 @given(i_d=CURRENT, i_q=CURRENT, angle=ANGLE)
 def test_phases_are_the_projections_on_three_windings(i_d: float, i_q: float, angle: float) -> None:
-    for phase, current in enumerate(phase_currents(i_d, i_q, angle, 1.0)):
+    for phase, current in enumerate(phase_currents(i_d, i_q, angle)):
         winding = 2.0 * math.pi * phase / 3.0
         expected = i_d * math.cos(angle - winding) - i_q * math.sin(angle - winding)
         assert current == pytest.approx(expected, abs=1e-12)
 
 
-def test_rms_currents_peak_higher_by_the_root_of_two() -> None:
-    assert phase_currents(7.0, 0.0, 0.0, SCALES['amplitude'])[0] == 7.0
-    assert phase_currents(7.0, 0.0, 0.0, SCALES['rms'])[0] == pytest.approx(9.9, abs=0.01)
+def test_the_amplitude_of_a_phase_is_the_length_of_the_vector() -> None:
+    assert phase_currents(7.0, 0.0, 0.0)[0] == 7.0
 
 
 def test_a_common_current_makes_no_field() -> None:
-    assert direct_quadrature_currents(2.0, 2.0, 2.0, 0.7, 1.0) == pytest.approx((0.0, 0.0))
+    assert direct_quadrature_currents(2.0, 2.0, 2.0, 0.7) == pytest.approx((0.0, 0.0))
 
 
 def test_one_pole_pitch_is_half_a_turn() -> None:

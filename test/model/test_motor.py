@@ -19,6 +19,17 @@ GAPS = st.floats(0.017, 0.034)
 CURRENTS = st.floats(-10.0, 10.0)
 
 
+@given(gap=GAPS, i_d=CURRENTS, i_q=CURRENTS)
+def test_constants_of_rms_values_take_amplitudes_all_the_same(
+    gap: float, i_d: float, i_q: float
+) -> None:
+    rms = machine_constants(MachineParameters(dq_scaling='rms'))
+    root = math.sqrt(2.0)
+    found = motor.forces_of_currents(motor.force_coefficients(rms, gap), root * i_d, root * i_q)
+    expected = motor.forces_of_currents(motor.force_coefficients(MACHINE, gap), i_d, i_q)
+    assert found == pytest.approx(expected, abs=1e-9)
+
+
 @pytest.mark.parametrize(
     ('gap', 'attraction', 'direct', 'horizontal', 'quadratic'),
     [

@@ -81,7 +81,7 @@ def test_no_phase_exceeds_its_peak_wherever_the_platen_is() -> None:
         for motor in range(4):
             angle = math.pi * (z if motor % 2 == 0 else x) / 0.05715
             flowing = stage.direct_current[motor], stage.quadrature_current[motor]
-            phases = np.array(phase_currents(*flowing, angle, 1.0))
+            phases = np.array(phase_currents(*flowing, angle))
             spread = np.ptp(phases)  # what the phases have in common makes no field
             assert spread <= 14.0 + 1e-9
 
@@ -96,14 +96,12 @@ def test_a_large_quadrature_current_costs_direct_current() -> None:
     assert stage.quadrature_current[0] == pytest.approx(14.0 / math.sqrt(3.0))
 
 
-def test_rms_scaling_reaches_the_peak_earlier() -> None:
-    stage = _stage(amplifier__bandwidth=0.0, amplifier__dq_scaling='rms')
-    stage.write([4.9] * 4, [0.0] * 4)
+@pytest.mark.parametrize('scaling', ['amplitude', 'rms'])
+def test_a_current_up_to_the_peak_flows_by_either_scaling(scaling: str) -> None:
+    stage = _stage(amplifier__bandwidth=0.0, machine__dq_scaling=scaling)
+    stage.write([6.9] * 4, [0.0] * 4)
     stage.read()
-    assert list(stage.direct_current) == [4.9] * 4
-    stage.write([6.0] * 4, [0.0] * 4)
-    stage.read()
-    assert np.all(stage.direct_current < 5.9)
+    assert list(stage.direct_current) == [6.9] * 4
 
 
 def test_the_thermal_budget_is_spent_clips_and_recovers() -> None:

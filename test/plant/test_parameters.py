@@ -63,7 +63,7 @@ def test_ideal_has_no_friction_counts_or_lag() -> None:
         ('initial.position', (0.025, 0.06, 0.0, 0.0, 0.0), r'initial.position.* x '),
         ('initial.position', (0.031, 0.0, 0.0, 0.0, 0.01), 'initial.position.*vertical stop'),
         ('guide.coulomb_velocity', (1e-5,) * 5, 'substeps.*at least'),
-        ('amplifier.dq_scaling', 'peak', 'dq_scaling'),
+        ('machine.dq_scaling', 'peak', 'dq_scaling'),
         ('machine.theta_max', 0.08, r"'machine.theta_max'.* gap of a motor is -.* mm"),
     ],
 )

@@ -14,7 +14,7 @@ import numpy as np
 
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_model.axes import FloatArray
-from maglev_model.commutation import SCALES, phase_currents
+from maglev_model.commutation import phase_currents
 from maglev_model.compiled import borrowing, compiled
 from maglev_model.records import Block, Record
 
@@ -30,7 +30,6 @@ class AmplifierArrays(Record):
     """What :func:`drive` takes; twelve phases: a, b, c of motor 1, then 2, 3, 4."""
 
     wave: float  # electrical angle per displacement, pi / tau [rad/m]
-    scale: float  # phase amplitude per dq current
     angle: Annotated[FloatArray, 4]  # of motors 1..4 at displacement 0 [rad]
     command_limit: float  # of a motor's dq amplitude [A]
     trip_current: float  # of a phase [A]
@@ -104,7 +103,7 @@ def drive(block: Block, i_d: FloatArray, i_q: FloatArray, x: float, z: float) ->
             return OVER_LIMIT, motor
     for motor in range(4):
         angle = amplifier.angle[motor] + amplifier.wave * (z if motor % 2 == 0 else x)
-        a, b, c = phase_currents(i_d[motor], i_q[motor], angle, amplifier.scale)
+        a, b, c = phase_currents(i_d[motor], i_q[motor], angle)
         amplifier.wanted[3 * motor] = a
         amplifier.wanted[3 * motor + 1] = b
         amplifier.wanted[3 * motor + 2] = c
@@ -125,7 +124,6 @@ class Amplifiers:
         self._thermal_time = amplifier.thermal_time
         self.arrays = AmplifierArrays(
             wave=math.pi / parameters.machine.pole_pitch,
-            scale=SCALES[commutation.dq_scaling],
             angle=commutation.offset,
             command_limit=parameters.fault.command_limit,
             trip_current=parameters.fault.over_current,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_model.axes import PHI, THETA, FloatArray, X, Y, Z
-from maglev_model.commutation import SCALES, direct_quadrature_currents
+from maglev_model.commutation import direct_quadrature_currents
 from maglev_model.compiled import borrowing, compiled
 from maglev_model.machine import machine_constants
 from maglev_model.machine_array import MachineArray, machine_from_array
@@ -36,7 +36,6 @@ class ObserverArrays(Record):
     machine: MachineArray
     period: float  # [s]
     wave: float  # electrical angle per displacement, pi / tau [rad/m]
-    scale: float  # phase amplitude per dq current
     angle: Annotated[FloatArray, 4]  # of motors 1..4 at displacement 0 [rad]
     count: Annotated[FloatArray, 6]  # [m]
     gain: Annotated[FloatArray, 3]  # of position, rate [1/s], disturbance [1/s²]
@@ -66,7 +65,6 @@ def observer_fields(parameters: BridgeParameters) -> dict[str, Any]:
         'machine': machine_constants(machine),
         'period': period,
         'wave': math.pi / machine.pole_pitch,
-        'scale': SCALES[commutation.dq_scaling],
         'angle': commutation.offset,
         'count': parameters.encoder.resolution,
         'gain': (
@@ -107,7 +105,7 @@ def _push(o: ObserverArrays, current: FloatArray) -> tuple[float, float, float, 
         k = 3 * motor
         angle = o.angle[motor] + o.wave * o.position[Z if motor % 2 == 0 else X]
         i_d[motor], i_q[motor] = direct_quadrature_currents(
-            current[k], current[k + 1], current[k + 2], angle, o.scale
+            current[k], current[k + 1], current[k + 2], angle
         )
     machine = machine_from_array(o.machine)
     return output_accelerations(

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.signal_parameters import check_places, check_signs
 from maglev_model.axes import FloatArray
-from maglev_model.commutation import SCALES, direct_quadrature_currents
+from maglev_model.commutation import direct_quadrature_currents
 from maglev_model.compiled import borrowing, compiled
 from maglev_model.machine import Machine
 from maglev_model.machine_array import machine_from_array
@@ -42,7 +42,6 @@ class RigArrays(Record):
     short_current: float  # what the supply's voltage drives through a winding for ever [A]
     peak: float  # [A]
     wave: float  # pi / tau [rad/m]
-    scale: float  # phase amplitude per dq current
     angle: Annotated[FloatArray, 4]  # of motors 1..4 at displacement 0 [rad]
     gain: Annotated[FloatArray, 12]  # [A/V], with the sign; 0 for a dead phase
     offset: Annotated[FloatArray, 12]  # [V]
@@ -79,7 +78,6 @@ def _commute(rig: RigArrays, stage: StageArrays, before: FloatArray) -> None:
             0.5 * (before[k + 1] + rig.current[k + 1]),
             0.5 * (before[k + 2] + rig.current[k + 2]),
             angle,
-            rig.scale,
         )
         stage.command[motor], stage.command[4 + motor] = i_d, i_q
 
@@ -254,12 +252,7 @@ def _plant(parameters: BridgeParameters, step: float) -> PlantParameters:
         substeps=1,
         seed=emulation.seed,
         machine=parameters.machine,
-        amplifier=AmplifierParameters(
-            bandwidth=0.0,
-            peak_current=1e6,
-            continuous_current=1e6,
-            dq_scaling=parameters.commutation.dq_scaling,
-        ),
+        amplifier=AmplifierParameters(bandwidth=0.0, peak_current=1e6, continuous_current=1e6),
         encoder=emulation.encoder,
         guide=emulation.guide,
         stop=emulation.stop,
@@ -279,7 +272,6 @@ def _rig_arrays(parameters: BridgeParameters, step: float) -> RigArrays:
         short_current=winding.voltage / winding.resistance,
         peak=winding.peak_current,
         wave=math.pi / machine.pole_pitch,
-        scale=SCALES[parameters.commutation.dq_scaling],
         angle=np.array(wiring.angle) + parameters.effects.motor.commutation,
         gain=np.array(wiring.gain) * np.array(wiring.phase_sign),
         offset=wiring.offset,

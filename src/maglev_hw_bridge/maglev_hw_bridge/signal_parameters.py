@@ -52,11 +52,6 @@ class CommutationParameters:
         within=(-10.0, 10.0),
         length=4,
     )
-    dq_scaling: str = parameter(
-        'amplitude',
-        'whether dq currents are amplitudes or RMS values of the phase currents',
-        choices=('amplitude', 'rms'),
-    )
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -1,8 +1,7 @@
 """Park's transformation between a motor's direct and quadrature currents and its three phases.
 
 The electrical angle is π·s/τ, with s the motor's own displacement: x for motors 2 and 4, z for 1
-and 3. ``scale`` is the peak of a phase current per ampere of dq current: 1 when dq currents are
-amplitudes, √2 when they are RMS values.
+and 3. The length of (i_d, i_q) is the amplitude of the phase currents.
 """
 
 from __future__ import annotations
@@ -11,9 +10,6 @@ import math
 
 from maglev_model.compiled import borrowing
 from maglev_model.machine import Machine
-
-SCALES = {'amplitude': 1.0, 'rms': math.sqrt(2.0)}
-"""``scale`` by the name of the convention."""
 
 _SIN_120 = math.sqrt(3.0) / 2.0
 
@@ -25,25 +21,23 @@ def electrical_angle(machine: Machine, displacement: float) -> float:
 
 
 @borrowing
-def phase_currents(
-    i_d: float, i_q: float, angle: float, scale: float
-) -> tuple[float, float, float]:
+def phase_currents(i_d: float, i_q: float, angle: float) -> tuple[float, float, float]:
     """Phase currents [A] from ``i_d``, ``i_q`` [A] at ``angle`` [rad]: inverse Park."""
     cos, sin = math.cos(angle), math.sin(angle)
-    alpha = scale * (i_d * cos - i_q * sin)
-    beta = scale * (i_d * sin + i_q * cos)
+    alpha = i_d * cos - i_q * sin
+    beta = i_d * sin + i_q * cos
     return alpha, -0.5 * alpha + _SIN_120 * beta, -0.5 * alpha - _SIN_120 * beta
 
 
 @borrowing
 def direct_quadrature_currents(
-    i_a: float, i_b: float, i_c: float, angle: float, scale: float
+    i_a: float, i_b: float, i_c: float, angle: float
 ) -> tuple[float, float]:
     """``i_d``, ``i_q`` [A] from the phase currents [A] at ``angle`` [rad]: Park.
 
     What the three phases have in common makes no travelling field and drops out.
     """
     cos, sin = math.cos(angle), math.sin(angle)
-    alpha = (2.0 * i_a - i_b - i_c) / (3.0 * scale)
-    beta = (i_b - i_c) / (2.0 * _SIN_120 * scale)
+    alpha = (2.0 * i_a - i_b - i_c) / 3.0
+    beta = (i_b - i_c) / (2.0 * _SIN_120)
     return alpha * cos + beta * sin, beta * cos - alpha * sin

@@ -17,6 +17,9 @@ from maglev_model.parameters import ParameterError, parameter
 VACUUM_PERMEABILITY = 4e-7 * math.pi
 """µ0 [H/m]."""
 
+PEAK_PER_AMPERE = {'amplitude': 1.0, 'rms': math.sqrt(2.0)}
+"""Amplitude of a phase current per ampere, by what is meant by that."""
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class MachineParameters:
@@ -24,9 +27,15 @@ class MachineParameters:
 
     slot_width: float = parameter(12.7e-3, 'stator slot width b_0', unit='m', within=(1e-3, 0.1))
     slot_pitch: float = parameter(19.05e-3, 'stator slot pitch t_1', unit='m', within=(1e-3, 0.1))
-    turns: int = parameter(900, 'turns per phase W', within=(1, 100_000))
+    turns: int = parameter(900, 'turns per phase W', within=(1, 10_000))
     winding_factor: float = parameter(
         1.0, 'winding factor of the first harmonic k_w1', within=(0.1, 1.0)
+    )
+    dq_scaling: str = parameter(
+        'amplitude',
+        'whether K_v2, K_v3 and K_h are those of amplitudes or of RMS values of the phase '
+        'currents; i_d and i_q are amplitudes everywhere',
+        choices=tuple(PEAK_PER_AMPERE),
     )
     pole_pairs: int = parameter(3, 'stator pole pairs p per motor', within=(1, 100))
     pole_pitch: float = parameter(57.15e-3, 'pole pitch tau', unit='m', within=(5e-3, 0.5))
@@ -143,7 +152,8 @@ class Machine(NamedTuple):
 def machine_constants(parameters: MachineParameters) -> Machine:
     """The constants of (3), (4), (6), (7) for one set of parameters."""
     p = parameters
-    L_A, p_m, W, k_w1 = p.magnet_length, p.magnets, p.turns, p.winding_factor
+    L_A, p_m, k_w1 = p.magnet_length, p.magnets, p.winding_factor
+    W = p.turns / PEAK_PER_AMPERE[p.dq_scaling]  # for constants per ampere of amplitude
     tau, mu_0 = p.pole_pitch, VACUUM_PERMEABILITY
     magnet_shape = math.sinh(math.pi * p.magnet_height / tau) * math.sin(
         math.pi * p.magnet_width / (2.0 * tau)

@@ -36,16 +36,15 @@ def limit_phase(stage: StageArrays, phase: int, current: float) -> float:
 @borrowing
 def set_targets(stage: StageArrays, machine: Machine) -> None:
     """Write what the amplifiers aim at for one sample, from the commanded currents."""
-    scale = stage.dq_scale
     for first in range(2):  # opposite motors have one angle
         angle = electrical_angle(machine, stage.state[2] if first else stage.state[4])
         for motor in range(first, 4, 2):
             wanted_d, wanted_q = stage.command[motor], stage.command[4 + motor]
-            want_a, want_b, want_c = phase_currents(wanted_d, wanted_q, angle, scale)
+            want_a, want_b, want_c = phase_currents(wanted_d, wanted_q, angle)
             a = limit_phase(stage, 3 * motor, want_a)
             b = limit_phase(stage, 3 * motor + 1, want_b)
             c = limit_phase(stage, 3 * motor + 2, want_c)
             if a != want_a or b != want_b or c != want_c:
-                wanted_d, wanted_q = direct_quadrature_currents(a, b, c, angle, scale)
+                wanted_d, wanted_q = direct_quadrature_currents(a, b, c, angle)
             stage.target[motor] = wanted_d
             stage.target[4 + motor] = wanted_q

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maglev_model.axes import FloatArray
-from maglev_model.commutation import SCALES
 from maglev_model.machine import Machine, machine_constants
 from maglev_model.machine_array import MachineArray
 from maglev_model.records import Record
@@ -37,7 +36,6 @@ class StageArrays(Record):
     continuous: float  # [A]
     thermal_gain: float  # 1 - exp(-sample time / thermal time)
     thermal_recovery: float  # load
-    dq_scale: float
 
     gap_resolution: float  # [m]
     horizontal_resolution: float
@@ -164,7 +162,6 @@ def _amplifiers(parameters: PlantParameters) -> dict[str, Any]:
         'continuous': amplifier.continuous_current,
         'thermal_gain': -math.expm1(-parameters.sample_time / amplifier.thermal_time),
         'thermal_recovery': amplifier.thermal_recovery,
-        'dq_scale': SCALES[amplifier.dq_scaling],
     }
 
 

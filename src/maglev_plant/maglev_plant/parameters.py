@@ -51,11 +51,6 @@ class AmplifierParameters:
         'a phase that has spent its budget (load 1) gets its peak back below this load',
         within=(0.0, 1.0),
     )
-    dq_scaling: str = parameter(
-        'amplitude',
-        'whether dq currents are amplitudes or RMS values of the phase currents',
-        choices=('amplitude', 'rms'),
-    )
 
     def __post_init__(self) -> None:
         """Refuse a continuous current above the peak."""

@@ -121,7 +121,7 @@ def _take_command(stage: StageArrays, machine: Machine) -> None:
         displacement = stage.state[4] if motor % 2 == 0 else stage.state[2]
         angle = electrical_angle(machine, displacement)
         i_d, i_q = stage.command[motor], stage.command[4 + motor]
-        a, b, c = phase_currents(i_d, i_q, angle, stage.dq_scale)
+        a, b, c = phase_currents(i_d, i_q, angle)
         wanted[3 * motor] = limit_phase(stage, 3 * motor, a)
         wanted[3 * motor + 1] = limit_phase(stage, 3 * motor + 1, b)
         wanted[3 * motor + 2] = limit_phase(stage, 3 * motor + 2, c)

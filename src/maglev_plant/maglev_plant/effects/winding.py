@@ -1,12 +1,11 @@
 """Phase currents of the windings: resistance, L(g), back-EMF, and the rail that limits them.
 
-A motor's co-energy, with dq currents of ``scale`` amperes of phase amplitude each and i the vector
-of amplitudes, is ``W' = W_m(g) + 3/2 (ψ·i + L(g) |i|²/2)``. Its derivative by the gap is the force
-(2), term by term, hence ``dL/dg = -(4/3) K_v3 L_v3 / scale²``: 93 mH from 20 to 30 mm, with
-amplitudes. Each force of the magnets has the EMF that takes its power:
+A motor's co-energy, with i the vector of its dq currents, is ``W' = W_m(g) + 3/2 (ψ·i + L(g)
+|i|²/2)``. Its derivative by the gap is the force (2), term by term, hence ``dL/dg = -(4/3) K_v3
+L_v3``: 93 mH from 20 to 30 mm. Each force of the magnets has the EMF that takes its power:
 
-- along d ``(2/3) K_v2 L_v2 / scale`` times the speed of the gap, by (2);
-- along q ``-(2/3) K_h L_h / scale`` times that along the motor, by (1): 17 V per m/s at 25 mm.
+- along d ``(2/3) K_v2 L_v2`` times the speed of the gap, by (2);
+- along q ``-(2/3) K_h L_h`` times that along the motor, by (1): 17 V per m/s at 25 mm.
 
 What the amplifiers give is then copper loss, growth of the field energy ``3/4 L |i|²`` and
 mechanical work of the forces, exactly. Were (1) the derivative of W' by the displacement too,
@@ -26,7 +25,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 import numpy as np
 
 from maglev_model.axes import FloatArray
-from maglev_model.commutation import SCALES, direct_quadrature_currents, phase_currents
+from maglev_model.commutation import direct_quadrature_currents, phase_currents
 from maglev_model.compiled import borrowing, compiled
 from maglev_model.machine import Machine
 from maglev_model.motor import force_coefficients
@@ -49,7 +48,6 @@ class WindingArrays(Record):
     voltage: float  # [V]
     resistance: float  # cold [ohm]
     warm_copper: float  # factor on it now
-    scale: float  # phase amplitude per dq current
     wave: float  # pi / tau [rad/m]
     offset: Annotated[FloatArray, 4]  # of the electrical angle [rad]
     decay: float  # of a current error over a step, without the rail
@@ -67,18 +65,16 @@ class WindingArrays(Record):
 def winding_arrays(parameters: PlantParameters, machine: Machine, step: float) -> WindingArrays:
     """Windings without current, for steps of ``step`` [s]; raises ParameterError."""
     given = parameters.effects.winding
-    scale = SCALES[parameters.amplifier.dq_scaling]
     narrowest, widest = parameters.motor_gaps
     low = min(0.5 * parameters.machine.gap_min, narrowest)
     gaps = np.linspace(low, 1.5 * widest, INTERVALS + 1)
-    slope = np.array([_inductance_slope(machine, g, scale) for g in gaps])
-    above = np.concatenate([[0.0], np.cumsum(_integrals(machine, gaps, scale))])
+    slope = np.array([_inductance_slope(machine, g) for g in gaps])
+    above = np.concatenate([[0.0], np.cumsum(_integrals(machine, gaps))])
     arrays = WindingArrays(
         on=given.voltage > 0.0,
         voltage=given.voltage,
         resistance=given.resistance,
         warm_copper=1.0,
-        scale=scale,
         wave=math.pi / machine.tau,
         offset=parameters.effects.motor.commutation,
         least_gap=low,
@@ -107,11 +103,11 @@ def set_current_loop(arrays: WindingArrays, bandwidth: float, step: float) -> No
     arrays.mean = -math.expm1(-steps) / steps if steps > 0.0 else 0.0
 
 
-def _inductance_slope(machine: Machine, gap: float, scale: float) -> float:
-    return float(-_SLOPE * force_coefficients(machine, gap)[2] / scale**2)
+def _inductance_slope(machine: Machine, gap: float) -> float:
+    return float(-_SLOPE * force_coefficients(machine, gap)[2])
 
 
-def _integrals(machine: Machine, gaps: FloatArray, scale: float) -> FloatArray:
+def _integrals(machine: Machine, gaps: FloatArray) -> FloatArray:
     """The slope's integral over each interval, by Gauss and Legendre."""
     nodes, weights = np.polynomial.legendre.leggauss(6)
     half = 0.5 * (gaps[1] - gaps[0])
@@ -119,7 +115,7 @@ def _integrals(machine: Machine, gaps: FloatArray, scale: float) -> FloatArray:
         [
             half
             * sum(
-                weight * _inductance_slope(machine, low + half * (1.0 + node), scale)
+                weight * _inductance_slope(machine, low + half * (1.0 + node))
                 for node, weight in zip(nodes, weights, strict=True)
             )
             for low in gaps[:-1]
@@ -206,13 +202,13 @@ def carry_currents(
             before = inductance(winding, strength, gap - 0.5 * step * gap_rate)
             after = inductance(winding, strength, gap + 0.5 * step * gap_rate)
             e_d, e_q = _EMF * k_2 * gap_rate, -_EMF * k_h * speed
-            e_a, e_b, e_c = phase_currents(e_d, e_q, angle, 1.0 / winding.scale)
+            e_a, e_b, e_c = phase_currents(e_d, e_q, angle)
         p = winding.phase[3 * motor : 3 * motor + 3]
         t = target[3 * motor : 3 * motor + 3]
         p[0], a = _flow(winding, p[0], t[0], e_a, before, after, step)
         p[1], b = _flow(winding, p[1], t[1], e_b, before, after, step)
         p[2], c = _flow(winding, p[2], t[2], e_c, before, after, step)
-        mean[motor], mean[4 + motor] = direct_quadrature_currents(a, b, c, angle, winding.scale)
+        mean[motor], mean[4 + motor] = direct_quadrature_currents(a, b, c, angle)
 
 
 @borrowing
@@ -224,5 +220,5 @@ def flowing_currents(
         along, _ = along_across(motors, motor, state[2], state[4])
         angle = winding.wave * along + winding.offset[motor]
         p = winding.phase[3 * motor : 3 * motor + 3]
-        i_d, i_q = direct_quadrature_currents(p[0], p[1], p[2], angle, winding.scale)
+        i_d, i_q = direct_quadrature_currents(p[0], p[1], p[2], angle)
         out[motor], out[4 + motor] = i_d, i_q
