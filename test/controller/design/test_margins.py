@@ -9,10 +9,11 @@ from pathlib import Path
 import control
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from maglev_controller.design.axis_design import controller_system, resting
 from maglev_controller.design.margins import check_margins, loop_margins
-from maglev_controller.design.state_space import closed_loop, plant_system, response
+from maglev_controller.design.state_space import Mode, closed_loop, plant_system, response
 from maglev_controller.estimation import DOUBT
 from maglev_controller.laws.output_regulator import design as design_axis
 from maglev_controller.parameters import ControllerParameters
@@ -120,6 +121,25 @@ def test_narrow_peaks_are_found() -> None:
     assert found.sensitivity == pytest.approx(peak, rel=0.01)
     with pytest.raises(ParameterError, match=r'the phase margin is 1\d\.\d deg'):
         check_margins(chosen, found, 'y')
+
+
+@pytest.mark.parametrize('peak', [1.0003, 1.00003])
+def test_crossovers_beside_a_peak_that_just_reaches_one_are_found(peak: float) -> None:
+    """Nearer each other than any grid: the smallest phase margin is at one of them."""
+    design, frequency = design_axis(parameters(), 'y'), 600.0 * math.pi
+    omega = frequency * (1.0 + np.linspace(-2e-3, 2e-3, 100_001))
+    z = np.exp(1j * PERIOD * omega)
+    feedback, rigid = response(controller_system(design, PERIOD, 0), z), plant_system(PERIOD)
+    flexible = plant_system(PERIOD, modes=(Mode(frequency, 1e-3, 1.0),))
+    bend = response(flexible, z) - response(rigid, z)
+    gain = brentq(
+        lambda k: np.max(np.abs(feedback * (response(rigid, z) + k * bend))) - peak, 0.0, 0.1
+    )
+    loop = -feedback * (response(rigid, z) + gain * bend)
+    above = np.flatnonzero(np.abs(loop) > 1.0)
+    found = loop_margins(design, PERIOD, modes=(Mode(frequency, 1e-3, gain),))
+    assert found.crossover == pytest.approx(omega[above[-1]], abs=1e-4)
+    assert found.phase == pytest.approx(np.degrees(np.angle(-loop[above[-1]])) % 360.0, abs=5e-3)
 
 
 @pytest.mark.parametrize('slope', [10.0, 200.0, 1320.0, 1500.0])

@@ -12,15 +12,18 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.linalg import eigvals
 
 from maglev_controller.design.axis_design import AxisDesign, controller_system, resting
 from maglev_controller.design.modes import variants
 from maglev_controller.design.state_space import (
     ComplexArray,
     Mode,
+    StateSpace,
     closed_loop,
     plant_system,
     response,
+    series,
 )
 from maglev_controller.estimation import DOUBT
 from maglev_controller.parameters import ControllerParameters, MarginParameters
@@ -29,6 +32,7 @@ from maglev_model.parameters import ParameterError
 
 _GRID = 1500  # frequencies looked at
 _RINGING = 0.8  # |z| of a pole that may ring
+_BESIDE = 1.0 + np.array([-1e-4, -1e-7, 1e-7, 1e-4])  # of a crossover
 _SLOPES = tuple(np.geomspace(1.0, 1e6, 25))  # of friction against velocity [1/s]
 
 
@@ -112,7 +116,7 @@ def loop_margins(
     controller = controller_system(design, period, designed)
     plant = plant_system(period, delay, stiffness=design.stiffness, modes=modes)
     poles = np.linalg.eigvals(closed_loop(controller, plant)).astype(np.complex128)
-    omega = _frequencies(poles, period)
+    omega = _frequencies(poles, controller, plant, period)
     z = np.exp(1j * omega * period)
     loop = -response(controller, z) * response(plant, z)
     crossover, phase = _crossover(omega, loop)
@@ -129,13 +133,35 @@ def loop_margins(
     )
 
 
-def _frequencies(poles: ComplexArray, period: float) -> FloatArray:
-    """Those looked at [rad/s]: all over, and around the closed loop's poles where it rings."""
+def _frequencies(
+    poles: ComplexArray, controller: StateSpace, plant: StateSpace, period: float
+) -> FloatArray:
+    """Those looked at [rad/s]: all over, around poles that ring, and either side of crossovers."""
     omega = np.geomspace(0.05, math.pi / period * (1.0 - 1e-9), _GRID)
     ringing = poles[np.abs(poles) > _RINGING]
     width = np.abs(np.log(np.abs(ringing)))[:, None] * np.linspace(-5.0, 5.0, 101)
     near = (np.angle(ringing)[:, None] + width).ravel() / period
+    beside = np.angle(_unit_gains(series(controller, plant)))[:, None] / period * _BESIDE
+    near = np.concatenate([near, beside.ravel()])
     return np.union1d(omega, near[(near > omega[0]) & (near < omega[-1])])
+
+
+def _unit_gains(loop: StateSpace) -> ComplexArray:
+    """The z where L(z) L(1/z) = 1, those of the unit circle the crossovers: none is too narrow.
+
+    Eigenvalues of the pencil of ``x⁺ = A x + B u``, ``λ = Aᵀ λ⁺ + Cᵀ y``, ``u = Bᵀ λ⁺ + D y``.
+    """
+    state, drive, output, direct = loop
+    n = drive.size
+    left, right = np.zeros((2, 2 * n + 1, 2 * n + 1))
+    left[:n, :n], left[:n, -1] = state, drive
+    left[n:, :n] = np.vstack([np.outer(output, output), direct * output])
+    left[n:, -1] = np.append(direct * output, direct**2 - 1.0)
+    left[n:-1, n:-1] = -np.eye(n)
+    right[:n, :n] = np.eye(n)
+    right[n:, n:-1] = -np.vstack([state.T, drive])
+    found = eigvals(left, right)
+    return np.asarray(found[np.isfinite(found)])
 
 
 def _crossover(omega: FloatArray, loop: ComplexArray) -> tuple[float, float]:

@@ -106,6 +106,20 @@ def plant_system(
     return StateSpace(state, drive, output, 0.0)
 
 
+def series(first: StateSpace, second: StateSpace) -> StateSpace:
+    """The second system driven by what the first puts out; state: the first's, then its own."""
+    n = first.input.size
+    state = np.zeros((n + second.input.size,) * 2)
+    state[:n, :n], state[n:, n:] = first.state, second.state
+    state[n:, :n] = np.outer(second.input, first.output)
+    return StateSpace(
+        state,
+        np.append(first.input, second.input * first.direct),
+        np.append(second.direct * first.output, second.output),
+        first.direct * second.direct,
+    )
+
+
 def closed_loop(controller: StateSpace, plant: StateSpace) -> FloatArray:
     """The closed loop's transition matrix; state: the plant's, then the controller's."""
     n = plant.input.size
