@@ -145,6 +145,18 @@ def test_voltages_by_hand() -> None:
     )
 
 
+def test_no_inductance_is_negative_however_far_the_stop() -> None:
+    """5 mm beyond gap_max K_v3 would take 17 mH away; a tenth of what is given is left."""
+    table = parameters(limits__inductance=5e-3, limits__resistance=0.0)
+    far, pushed = np.tile(HOVER, (9, 1)), np.zeros((9, 5))
+    far[:, 0] = table.machine.gap_max + 5e-3
+    pushed[:, 1] = np.linspace(0.0, 1.0, 9)
+    samples = Kinematics(far, np.zeros((9, 5)), pushed)
+    direct, quadrature, _ = motor_currents(samples, table)
+    slope = np.hypot(np.diff(direct, axis=0), np.diff(quadrature, axis=0)) / table.sample_time
+    np.testing.assert_allclose(voltage_amplitudes(samples, table), 5e-4 * slope, rtol=1e-9)
+
+
 def test_steps_and_waypoints_take_the_profile() -> None:
     for name, given in (
         ('steps', {'steps__settle': 0.1}),

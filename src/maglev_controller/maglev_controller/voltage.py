@@ -20,7 +20,7 @@ from maglev_controller.control_arrays import INTERVALS, Record
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import borrowing, compiled
 from maglev_model.machine import Machine, machine_constants
-from maglev_model.motor import force_coefficients
+from maglev_model.motor import force_coefficients, inductances
 from maglev_model.platen import gaps_from_outputs, output_accelerations
 
 if TYPE_CHECKING:
@@ -31,23 +31,19 @@ USED: Final = 0.85
 
 
 def winding_settings(parameters: ControllerParameters) -> dict[str, ArrayLike]:
-    """The fields of WINDING; L is never below a tenth of that at ``gap_max``."""
+    """The fields of WINDING."""
     given, limits = parameters.winding, parameters.machine
     machine = machine_constants(limits)
     reach = limits.radius * max(limits.phi_max, limits.theta_max)
     gaps = np.linspace(0.5 * limits.gap_min, limits.gap_max + reach, INTERVALS + 1)
-    slope = np.array([-4.0 / 3.0 * force_coefficients(machine, gap)[2] for gap in gaps])
-    steps = 0.5 * (slope[1:] + slope[:-1]) * np.diff(gaps)
-    above = np.concatenate(([0.0], np.cumsum(steps)))
-    inductance = given.inductance + above - np.interp(limits.gap_max, gaps, above)
-    inductance = np.maximum(inductance, 0.1 * given.inductance)
+    k_3 = np.array([force_coefficients(machine, gap)[2] for gap in gaps])
     return {
         'limits': given.voltage > 0.0,
         'voltage': USED * given.voltage,
         'resistance': given.resistance,
         'least_gap': gaps[0],
         'spacing': gaps[1] - gaps[0],
-        'inductance': inductance,
+        'inductance': inductances(gaps, k_3, limits.gap_max, given.inductance),
     }
 
 

@@ -10,6 +10,9 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
+from maglev_model.axes import FloatArray
 from maglev_model.compiled import borrowing
 from maglev_model.machine import Machine
 
@@ -132,3 +135,14 @@ def attraction_coefficients(machine: Machine, gap: float) -> tuple[float, float,
     """
     k_1, _, k_3, k_h = force_coefficients(machine, gap)
     return math.sqrt(k_1), math.sqrt(k_3), k_h
+
+
+def inductances(gaps: FloatArray, k_3: FloatArray, gap: float, there: float) -> FloatArray:
+    """L [H] of a phase at rising ``gaps`` (n,) [m], which is ``there`` at ``gap``.
+
+    By co-energy ``dL/dg = -(4/3) K_v3 L_v3``, with ``k_3`` (n,) of :func:`force_coefficients`; but
+    never below a tenth of ``there``.
+    """
+    slope = -4.0 / 3.0 * k_3
+    rise = np.concatenate(([0.0], np.cumsum(0.5 * (slope[1:] + slope[:-1]) * np.diff(gaps))))
+    return np.maximum(there + rise - np.interp(gap, gaps, rise), 0.1 * there)

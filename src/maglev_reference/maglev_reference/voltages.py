@@ -14,7 +14,7 @@ import numpy as np
 from maglev_model.axes import FloatArray
 from maglev_model.geometry import motor_gaps
 from maglev_model.machine import machine_constants
-from maglev_model.motor import force_coefficients
+from maglev_model.motor import force_coefficients, inductances
 from maglev_reference.currents import motor_currents
 from maglev_reference.motion import Kinematics
 from maglev_reference.parameters import ReferenceParameters
@@ -28,11 +28,10 @@ def voltage_amplitudes(samples: Kinematics, parameters: ReferenceParameters) -> 
     machine = machine_constants(parameters.machine)
     direct, quadrature, _ = motor_currents(samples, parameters)
     gap = motor_gaps(samples.position, parameters.machine.radius)
-    table = np.linspace(gap.min(), max(gap.max(), parameters.machine.gap_max), _GRID)
+    stop = parameters.machine.gap_max
+    table = np.linspace(min(gap.min(), stop), max(gap.max(), stop), _GRID)
     factors = np.array([force_coefficients(machine, g) for g in table])
-    slope = -4.0 / 3.0 * factors[:, 2]
-    rise = np.concatenate(([0.0], np.cumsum(0.5 * (slope[1:] + slope[:-1]) * np.diff(table))))
-    inductance = limits.inductance + rise - np.interp(parameters.machine.gap_max, table, rise)
+    inductance = inductances(table, factors[:, 2], stop, limits.inductance)
     length, k_2, k_h = (
         np.interp(gap, table, y) for y in (inductance, factors[:, 1], factors[:, 3])
     )
