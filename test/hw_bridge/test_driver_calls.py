@@ -19,7 +19,9 @@ from hil_check import CallError, Module, Trouble
 from maglev_hw_bridge.drivers import DriverError, WatchdogError, make_driver, quanser
 from maglev_hw_bridge.drivers.quanser import QuanserDriver
 from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.stage import BridgeStage
 from maglev_model.parameters import ParameterError, build
+from maglev_model.stage import StageError
 
 COUNTS = np.arange(8, dtype=np.int32) * 100 - 300
 
@@ -310,6 +312,37 @@ def test_a_driver_that_lacks_a_call_is_refused_before_it_is_needed(
         ParameterError, match=r"'half_a\.driver', a driver without disable, enable$"
     ):
         make_driver(build(BridgeParameters, {'driver': 'half_a.driver'}), realtime=True)
+
+
+@pytest.mark.parametrize(
+    ('call', 'told'),
+    [
+        ('open', r'raised OSError: no device \(driver\.py, line \d+\)'),
+        ('counts', r'raised OSError: no device \(driver\.py, line \d+\)'),
+        ('returned', r"left 6 of the 6 encoders out: 'counts' and 'read' must write"),
+    ],
+)
+def test_a_driver_of_ones_own_that_goes_wrong_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: str, told: str
+) -> None:
+    """Counts that are returned, in place of written, would be read as zeros."""
+    name = f'own_{call}.driver'
+    module_in(
+        tmp_path,
+        name,
+        'from types import SimpleNamespace\n\n\n'
+        'def fails(*given):\n    raise OSError("no device")\n\n\n'
+        'def make(parameters, realtime):\n'
+        "    calls = ('open', 'start', 'read', 'write', 'disable', 'enable', 'stop', 'close')\n"
+        '    does = dict.fromkeys(calls, lambda *given: None)\n'
+        "    does['counts'] = lambda counts: [0] * 6\n"
+        f'    does.update({{{call!r}: fails}})\n'
+        '    return SimpleNamespace(late=0.0, stop_pressed=False, **does)\n',
+    )
+    monkeypatch.syspath_prepend(str(tmp_path))
+    stage = BridgeStage(build(BridgeParameters, {'driver': name, 'homing.at_start': False}))
+    with pytest.raises(StageError, match=rf"^parameter 'driver' is '{name}', which {told}"):
+        stage.configure()
 
 
 def test_nothing_else_imports_the_vendors_module() -> None:

@@ -24,11 +24,13 @@ from maglev_hw_bridge.memory import Memory
 from maglev_hw_bridge.mode import Mode
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES
+from maglev_model.plugins import told
 from maglev_model.stage import STOPPED_SINCE, EncoderSample, Fault, StageError
 
 FloatArray = NDArray[np.float64]
 
 _NEAR_ZERO = 2e-3  # counters that start anew are so near 0, though the platen was pushed [m]
+_BEFORE = np.array([[-(2**31)], [2**31 - 1]], np.int32)  # no encoder counts both, one after another
 _ELSEWHERE = 1e-4  # farther from there than noise and a platen that settles [m]
 
 
@@ -86,8 +88,7 @@ class StageLife(abc.ABC):
         self.memory.claim()
         try:
             load, fault = self.memory.recall()
-            self.driver.open()
-            self.driver.counts(self._counts)
+            self._open()
         except Exception as error:
             self.driver.close()
             self.memory.release()
@@ -105,6 +106,25 @@ class StageLife(abc.ABC):
             except HomingError as error:
                 self.close()
                 raise StageError(f'homing refused: {error}') from error
+
+    def _open(self) -> None:
+        """Open the boards and read what they count. Raises DriverError, whatever a driver does."""
+        whose = f"parameter 'driver' is '{self.parameters.driver}', which"
+        rows = _BEFORE.repeat(6, axis=1)
+        try:
+            self.driver.open()
+            for row in rows:
+                self.driver.counts(row)
+        except DriverError:
+            raise
+        except Exception as error:
+            raise DriverError(f'{whose} raised {told(error)}') from error
+        if left := np.count_nonzero(np.all(rows == _BEFORE, axis=0)):
+            raise DriverError(
+                f"{whose} left {left} of the 6 encoders out: 'counts' and 'read' must write what "
+                'they count into the array that they are given'
+            )
+        self._counts[:] = rows[-1]
 
     def _rest(self, mode: Mode) -> None:
         """No current flows from now on."""
@@ -337,8 +357,7 @@ class StageLife(abc.ABC):
         """
         total = self.encoders.arrays.total.copy()
         try:
-            self.driver.open()
-            self.driver.counts(self._counts)
+            self._open()
             self._forget_home_of_lost_counts(total)
             self.mode = Mode.READY
             wrong = self._speaks_against()
