@@ -8,7 +8,7 @@ import pytest
 from maglev_hw_bridge import guard, guard_arrays, observer
 from maglev_hw_bridge.amplifiers import Amplifiers
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_hw_bridge.standing_still import SETTLING, call_the_roll, look
+from maglev_hw_bridge.standing_still import call_the_roll, look
 from maglev_model.axes import PHI, THETA, X, Y, Z
 from maglev_model.machine import machine_constants
 from maglev_model.platen import output_accelerations
@@ -159,7 +159,7 @@ def test_x_is_missed_near_the_lower_stop_too_when_a_gap_is_lost(
 def test_what_may_be_held_has_moved_no_way_unseen(along: int, rate: float) -> None:
     """Before friction held it, it may have gone as far as less than a count."""
     watched = guard.Guard(PARAMETERS).arrays
-    watched.samples = SETTLING
+    watched.samples = watched.settling
     watched.least_rate[along], watched.unseen[3 + along] = rate, 2e-5
     look(watched.block[0], True, np.zeros(6, np.bool_))
     unseen = 2e-5 + rate * PARAMETERS.sample_time if rate else 0.0

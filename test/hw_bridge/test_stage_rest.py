@@ -174,10 +174,12 @@ def test_what_slides_has_amplifiers_that_are_on() -> None:
     assert 'slid' in stage.fault.reason
 
 
-@pytest.mark.parametrize(('step', 'leaps'), [(0.99e-4, False), (1.01e-4, True)])
-def test_what_leaps_in_a_sample_has_not_slid(step: float, *, leaps: bool) -> None:
+@pytest.mark.parametrize('period', [1e-3, 5e-3])
+@pytest.mark.parametrize(('speed', 'leaps'), [(0.099, False), (0.101, True)])
+def test_what_leaps_in_a_sample_has_not_slid(speed: float, period: float, *, leaps: bool) -> None:
     stage, _ = active()
     watched(stage, LOWER_STOP)
+    stage.sample_time, stage.guard.arrays.samples, step = period, 10, speed * period
     for _ in range(120):
         stage._slides()
     found = []

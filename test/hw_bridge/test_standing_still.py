@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from maglev_hw_bridge.guard_arrays import LOST, NOISY, PUT_RIGHT, SOUND, GuardArrays
 from maglev_hw_bridge.standing_still import (
     CONTRADICTED,
-    SETTLING,
     UNSEEN,
     find_stuck,
     follow_model,
@@ -64,7 +63,7 @@ def test_but_not_where_it_may_stand_still(encoder: int, why: str) -> None:
     if why == 'it counts':
         watched.past[0, encoder] -= 1e-5
     if why == 'not settled':
-        watched.samples = SETTLING - 1
+        watched.samples = watched.settling - 1
     if why == 'held':
         watched.least_rate[:] = 0.0
     if why.startswith('near'):
@@ -157,7 +156,7 @@ def test_how_long_x_and_z_have_been_silent_in_flight(encoder: int, why: str) -> 
     if why == 'it counts':
         watched.past[0, encoder] -= 1e-5
     if why == 'not settled':
-        watched.samples = SETTLING - 1
+        watched.samples = watched.settling - 1
     if why == 'lost':
         watched.trust[encoder] = LOST
     if why == 'on the stop':

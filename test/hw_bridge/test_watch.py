@@ -9,7 +9,7 @@ from hovering import PARAMETERS, Hover
 from maglev_hw_bridge import guard
 from maglev_hw_bridge.guard_arrays import LOST, PUT_RIGHT, SOUND
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_hw_bridge.standing_still import SETTLING
+from maglev_hw_bridge.standing_still import call_the_roll
 from maglev_model.axes import AXES, X, Y
 from maglev_model.parameters import build
 
@@ -82,7 +82,7 @@ def test_unless_something_else_may_explain_it(why: str) -> None:
 
 def test_nor_before_the_disturbance_is_found() -> None:
     hover = Hover()
-    hover.watched.samples = SETTLING - 1
+    hover.watched.samples = hover.watched.settling - 1
     hover.watched.max_unexplained[:] = -1.0
     codes = [hover.sample()[0] for _ in range(11)]
     assert codes == [guard.FINE] * 10 + [guard.MOTORS]
@@ -285,3 +285,40 @@ def test_x_and_z_that_slipped_are_believed_but_not_relied_on() -> None:
     judge = guard.Guard(PARAMETERS)
     judge.arrays.trust[:] = PUT_RIGHT
     assert judge.blind.tolist() == [False, True, True, False, False]
+
+
+@pytest.mark.parametrize(('period', 'samples'), [(1e-3, 10), (2e-3, 5)])
+def test_what_is_given_as_a_time_takes_as_long_at_any_sample_time(
+    period: float, samples: int
+) -> None:
+    """10 ms of a disturbance, 20 ms on probation, 100 ms to settle."""
+    slow = {'sample_time': period, 'fault.stale': 0.02, 'boards.watchdog': 0.02}
+    hover = Hover(settled=False, parameters=build(BridgeParameters, slow))
+    watched = hover.watched
+    assert watched.settling == round(0.1 / period)
+    watched.samples = watched.settling - 1
+    for number in range(samples + 1):
+        watched.disturbance[Y] = 1.01 * PARAMETERS.fault.unexplained[Y]
+        watched.position[:] = [0.025, 0.0, 0.0, 0.0, 0.0]
+        watched.rate[:] = 0.0
+        assert hover.sample()[0] == (guard.MOTORS if number == samples else guard.FINE)
+    hover.length[4] += 3e-4
+    assert hover.sample() == (guard.JUMP, 4)
+    assert watched.probation[4] == round(0.02 / period) - 1
+
+
+def test_what_one_sample_shows_may_be_noise_however_long_it_is() -> None:
+    slow = {'sample_time': 1e-2, 'fault.stale': 0.02, 'boards.watchdog': 0.02}
+    assert guard.Guard(build(BridgeParameters, slow)).arrays.unexplainable == 2
+
+
+@pytest.mark.parametrize('period', [1e-3, 5e-3])
+def test_how_fast_a_platen_leaves_its_stop_is_a_speed(period: float) -> None:
+    slow = {'sample_time': period, 'fault.stale': 0.02, 'boards.watchdog': 0.02}
+    hover = Hover(parameters=build(BridgeParameters, slow))
+    for speed, left in ((0.034, 1.0), (0.036, 0.0)):
+        watched = hover.watched
+        watched.left[:] = 0.0
+        watched.believed[:4] = watched.past[0, :4] - speed * period
+        call_the_roll(watched.block[0], True, np.zeros(6, np.bool_))
+        assert watched.left == pytest.approx(-left * speed * period * np.ones(4))

@@ -7,9 +7,10 @@ import itertools
 import numpy as np
 import pytest
 
-from maglev_hw_bridge.landing import Landing, impacts_of_cut
+from maglev_hw_bridge.landing import Landing, impact_of_cut, impacts_of_cut
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_model.axes import PHI, THETA, X, Z
+from maglev_model.parameters import build
 
 PARAMETERS = BridgeParameters()
 HOVER = np.array([0.025, 0.0, 0.0, 0.0, 0.0])
@@ -71,6 +72,22 @@ def test_unseen_it_is_over_below_the_place_from_which_a_cut_is_soft() -> None:
     assert not landing.step(LOW, REST, REST)
 
 
-def test_a_free_fall_from_anywhere_is_slower_than_a_speed_that_is_believed() -> None:
-    assert impacts_of_cut(PARAMETERS, 0.025, 0.7) == impacts_of_cut(PARAMETERS, 0.025, np.nan)
-    assert impacts_of_cut(PARAMETERS, 0.025, 0.699) != impacts_of_cut(PARAMETERS, 0.025, np.nan)
+@pytest.mark.parametrize(
+    ('machine', 'fastest'),
+    [
+        ({}, 0.8093),
+        ({'machine.gap_max': 0.044, 'fault.gap_upper': 0.05}, 1.1446),
+        ({'machine.magnet_charge': 1e6}, 0.9656),
+    ],
+    ids=['default', 'twice the way', 'stronger magnets'],
+)
+def test_a_free_fall_from_anywhere_is_slower_than_a_speed_that_is_believed(
+    machine: dict[str, float], fastest: float
+) -> None:
+    """By the hardest pull over all of the way."""
+    of = build(BridgeParameters, machine)
+    nothing = impacts_of_cut(of, 0.025, np.nan)
+    assert impacts_of_cut(of, 0.025, fastest + 2e-4) == nothing
+    assert impacts_of_cut(of, 0.025, fastest) != nothing
+    for start in (of.machine.gap_max - 1e-6, 0.0287, 0.028):
+        assert impact_of_cut(of, start, 0.0, 1.1)[0] < fastest

@@ -16,7 +16,7 @@ import numpy as np
 
 from maglev_hw_bridge import observer
 from maglev_hw_bridge.guard_arrays import LOST, SOUND, GuardArrays, gap_residual
-from maglev_hw_bridge.leaps import find_leaps
+from maglev_hw_bridge.leaps import PROBATION, find_leaps
 from maglev_hw_bridge.observer import Flags
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.standing_still import (
@@ -44,7 +44,7 @@ RANGE: Final = 5
 MOTORS: Final = 6
 
 _RESIDUAL_SAMPLES = 2
-_UNEXPLAINED_SAMPLES = 10
+_UNEXPLAINED = 0.01  # [s]
 _BEGUN = 2  # samples for position and rate
 _LEAPT = 2.5e-4  # more than this while the boards start is no motion of what rests [m]
 _IMPOSSIBLE = 0.01  # so far beyond its stop, tilts and all, an encoder reads no place [m]
@@ -74,13 +74,13 @@ def _contradiction(g: GuardArrays) -> bool:
 @borrowing
 def _unexplained(g: GuardArrays) -> int:
     """The axis that sound encoders show to move otherwise than commanded, or -1."""
-    seen = not observer.supported(g, Y) and g.samples >= SETTLING
+    seen = not observer.supported(g, Y) and g.samples >= g.settling
     for i in range(6):
         seen = seen and g.trust[i] == SOUND
     for axis in range(5):
         large = seen and abs(g.disturbance[axis]) > g.max_unexplained[axis]
         g.unexplained[axis] = g.unexplained[axis] + 1 if large else 0
-        if g.unexplained[axis] >= _UNEXPLAINED_SAMPLES:
+        if g.unexplained[axis] >= g.unexplainable:
             return axis
     return -1
 
@@ -197,6 +197,10 @@ class Guard:
 
     def __init__(self, parameters: BridgeParameters) -> None:
         fault = parameters.fault
+
+        def samples(time: float) -> int:
+            return max(round(time / parameters.sample_time), 2)  # one alone may be noise
+
         self.arrays = GuardArrays(
             **observer.observer_fields(parameters),
             max_jump=fault.jump,
@@ -208,6 +212,9 @@ class Guard:
             soft_lower=fault.lower,
             soft_upper=fault.upper,
             max_unexplained=fault.unexplained,
+            settling=samples(SETTLING),
+            on_probation=samples(PROBATION),
+            unexplainable=samples(_UNEXPLAINED),
             at_once=[float(board != 0) for board in parameters.encoder.board],
             expected=(math.nan,) * 6,
         )

@@ -30,6 +30,9 @@ class GuardArrays(ObserverArrays):
     soft_lower: Annotated[FloatArray, 5]  # y, x, z, phi, theta [m, rad]
     soft_upper: Annotated[FloatArray, 5]
     max_unexplained: Annotated[FloatArray, 5]  # [m/s², rad/s²]
+    settling: int  # samples until the disturbance is found
+    on_probation: int  # samples after a slip
+    unexplainable: int  # samples in a row with too large a disturbance that are a fault
     at_once: Annotated[FloatArray, 6]  # 1 where an encoder is read at once, 0: at the tick
 
     trust: Annotated[NDArray[np.int8], 6]  # SOUND, PUT_RIGHT, LOST or NOISY

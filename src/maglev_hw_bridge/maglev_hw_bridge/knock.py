@@ -25,7 +25,6 @@ _PUSH = 4e-3  # in either direction [s]
 _KNOCKS, _GROWTH = 7, 1.5  # at the most; how much harder each is than the one before
 _COUNTS = 1.2  # by which the platen is moved at least, by half of the hardest
 _HARDEST = 2.0
-_LATE = 4  # samples in which a count may still come
 
 
 @compiled
@@ -71,7 +70,7 @@ class _Asked:
         if counted and not self._answered:
             self._answered, self._turn = True, min(self._turn, self._samples)
         last = self._knocks == _KNOCKS
-        if self._samples < 2 * self._turn + (_LATE if last and not self._answered else 0):
+        if self._samples < 2 * self._turn + (self._duration if last and not self._answered else 0):
             return False
         if self._answered or last:
             self.under_way = False

@@ -44,7 +44,6 @@ _BRAKING_UPWARD = 0.1  # of y [s]
 _SEATED = 5e-5  # so near the lower stop a cut is soft [m]
 _FREE_STEP = 1e-4  # of the motion without current [s]
 _LONGEST_FALL = 10.0  # [s]
-_FASTEST = 0.7  # a free fall from anywhere is slower [m/s]
 _SPEED_UNKNOWN, _SPEED_DOUBT = 0.1, 5e-3  # by how much the rate of y may be off [m/s]
 _PLACE_DOUBT = 2e-4  # and y [m]
 _SHARE_IN_DOUBT = 0.1  # of the magnets' pull and of the rate
@@ -247,6 +246,16 @@ def impact_of_cut(
     return abs(speed), 'upper' if end <= machine.gap_min else 'lower'
 
 
+def _fastest(parameters: BridgeParameters) -> float:
+    """Speed that no free fall between the stops reaches [m/s]: nowhere is the pull harder."""
+    machine, room = parameters.machine, parameters.machine.gap_max - parameters.machine.gap_min
+    zero = np.zeros(4)
+    pull = output_accelerations(machine_constants(machine), machine.gap_min, 0.0, 0.0, zero, zero)[
+        0
+    ]
+    return math.sqrt(2.0 * room * max(abs(pull), machine.gravity))
+
+
 def impacts_of_cut(parameters: BridgeParameters, y: float, speed: float) -> dict[str, float]:
     """Speed [m/s] by each stop that a cut may end at, the harder first; arguments as above.
 
@@ -254,7 +263,7 @@ def impacts_of_cut(parameters: BridgeParameters, y: float, speed: float) -> dict
     old as the watchdog allows, and the magnets by up to 10 %. A speed that no platen has says
     nothing.
     """
-    if not (math.isfinite(speed) and abs(speed) < _FASTEST):
+    if not (math.isfinite(speed) and abs(speed) < _fastest(parameters)):
         speed, doubt = 0.0, _SPEED_UNKNOWN
     else:
         doubt = _SPEED_DOUBT + _SHARE_IN_DOUBT * abs(speed)

@@ -9,8 +9,8 @@ from maglev_model.axes import PHI, THETA, Y
 from maglev_model.compiled import borrowing
 from maglev_model.machine_array import machine_from_array
 
-PROBATION: Final = 20
-"""Samples after a slip in which noise would leap again."""
+PROBATION: Final = 0.02
+"""Time after a slip in which noise would leap again [s]."""
 
 _TAMED = 0.2  # how much of what is noisy is believed
 _FAR_OFF = 1.5e-3  # what a noisy one says farther off than this is no news [m]
@@ -26,7 +26,7 @@ def _drift(g: GuardArrays, i: int) -> float:
             g.friction[Y]
             + machine_from_array(g.machine).r * g.friction[PHI if i % 2 == 0 else THETA]
         )
-    return float(0.5 * held * (PROBATION * g.period) ** 2)
+    return float(0.5 * held * (g.on_probation * g.period) ** 2)
 
 
 @borrowing
@@ -43,7 +43,7 @@ def _leap(g: GuardArrays, i: int, error: float, step: float) -> None:
     platen would be pushed along by motors out of phase, faster than it lands.
     """
     if g.trust[i] == SOUND:
-        g.trust[i], g.probation[i], g.slip[i] = PUT_RIGHT, PROBATION, error
+        g.trust[i], g.probation[i], g.slip[i] = PUT_RIGHT, g.on_probation, error
         g.offset[i] += error
         g.believed[i] -= error
     elif i >= 4 and g.trust[9 - i] != SOUND and step != 0.0:

@@ -27,6 +27,7 @@ FloatArray = NDArray[np.float64]
 _ON_THE_STOP, _AT_REST = 1e-5, 1e-2  # nearer the lower stop and slower it rests [m], [m/s]
 _NEAR, _STILL, _REST_TIME = 2e-4, 1e-5, 0.1  # so it does where it moves no more there [m, m, s]
 _PARKED = 1e-4  # so far at most it moves along x and z in that time where it stands [m]
+_SLIDING = 0.1  # faster it is moved, or homed [m/s]
 _CORNERS = np.array([[-1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, -1.0]])  # (5): gaps by phi, theta
 _SOFT = 0.05  # a degraded landing's speed at the stop [m/s]
 _ROUNDING = 0.2  # of how many samples late
@@ -220,7 +221,8 @@ class BridgeStage(StageLife):
             return False
         place = self.guard.arrays.position[1:3]
         away = float(np.max(np.abs(place - self._parked_at)))
-        leapt = float(np.max(np.abs(place - self._was_at))) > _PARKED
+        most = _SLIDING * self.sample_time if self.guard.arrays.samples > 1 else _PARKED
+        leapt = float(np.max(np.abs(place - self._was_at))) > most
         parked = self._parked_samples * self.sample_time >= _REST_TIME
         slid = parked and not leapt and away > _LEFT
         if leapt or slid or (away >= _PARKED and not parked):

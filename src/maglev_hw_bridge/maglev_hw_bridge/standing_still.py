@@ -15,8 +15,8 @@ from maglev_model.machine_array import machine_from_array
 UNSEEN: Final = 1
 CONTRADICTED: Final = 2
 
-SETTLING: Final = 100
-"""Samples until the disturbance is found."""
+SETTLING: Final = 0.1
+"""Time until the disturbance is found [s]."""
 
 _DOUBT = 2.5e-5  # an encoder that should have moved this far is not followed [m]
 _CERTAIN = 1.5  # as many times max_unseen it is stuck whatever the others read
@@ -24,8 +24,8 @@ _DOUBTFUL_RESIDUAL = 6e-5  # [m]
 _DENIED = 1e-4  # of a motion that far the others must show half, where they can [m]
 _GROUND = 1e-3  # this near the lower stop no gap is at stake any more [m]
 _HEARD = 5  # counts one way that no stuck encoder makes
-_FASTEST = 5e-4  # in a sample [m]
-_LEAP = 3.5e-5  # in a sample no platen leaves it that fast [m]
+_FASTEST = 5e-4  # in a millisecond [m]
+_LEAP = 3.5e-5  # in a millisecond no platen leaves it that fast [m]
 _AGREED = 2e-5  # how near the others must read to what is foretold then [m]
 
 
@@ -57,14 +57,14 @@ def look(g: GuardArrays, flying: bool, counted: Flags) -> None:
         counted[i] = g.trust[i] != LOST and g.believed[i] != g.past[0, i]
         if i >= 4 and counted[i] and abs(g.unseen[i]) > _DOUBT:
             observer.take_at_its_word(g, i - 3, g.believed[i])
-        if counted[i] or not flying or g.samples < SETTLING or _at_rest(g, i):
+        if counted[i] or not flying or g.samples < g.settling or _at_rest(g, i):
             g.unseen[i] = 0.0
         else:
             g.unseen[i] += _least_step(g, i)
         if i < 4 and (counted[i] or not g.rigid):
             g.residual_then[i] = residual
         if i >= 4:
-            asked = flying and g.samples >= SETTLING and g.trust[i] != LOST
+            asked = flying and g.samples >= g.settling and g.trust[i] != LOST
             asked = asked and not (counted[i] or observer.supported(g, Y))
             g.silent[i - 4] = g.silent[i - 4] + 1 if asked else 0
         g.probation[i] = max(g.probation[i] - 1, 0)
@@ -89,7 +89,7 @@ def call_the_roll(g: GuardArrays, flying: bool, counted: Flags) -> bool:
     for i in range(4):
         step = g.believed[i] - g.past[0, i]
         g.answered[i] = max(g.answered[i], int(counted[i]))
-        g.left[i] = g.left[i] + step if abs(step) < _LEAP else 0.0
+        g.left[i] = g.left[i] + step if abs(step) < 1e3 * g.period * _LEAP else 0.0
         called = called or (g.trust[i] == SOUND and abs(g.left[i]) > g.roll_call)
     found = False
     for i in range(4):
@@ -174,7 +174,7 @@ def listen(g: GuardArrays) -> None:
         if g.trust[4 + k] != LOST or g.stood[k] == 0 or step == 0.0:
             continue
         way = 1 if step > 0.0 else -1
-        if abs(step) > _FASTEST or way * g.heard[k] < 0:
+        if abs(step) > 1e3 * g.period * _FASTEST or way * g.heard[k] < 0:
             g.heard[k] = 0
         g.heard[k] += way
         if abs(g.heard[k]) >= _HEARD:
