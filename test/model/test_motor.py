@@ -126,7 +126,14 @@ def test_machine_survives_the_array() -> None:
 
 @pytest.mark.parametrize(
     ('name', 'value'),
-    [('gap_min', 18.0), ('slot_width', 12.7), ('mass_y', 6900.0), ('turns', 900.0), ('G', 9.81)],
+    [
+        ('gap_min', 18.0),
+        ('slot_width', 12.7),
+        ('mass_y', 6900.0),
+        ('turns', 900.0),
+        ('turns', 36_000),
+        ('G', 9.81),
+    ],
 )
 def test_wrong_units_types_and_names_are_refused(name: str, value: float) -> None:
     with pytest.raises(ParameterError, match=name):
