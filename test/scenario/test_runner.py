@@ -8,6 +8,7 @@ import pty
 import resource
 import signal
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -118,9 +119,9 @@ def test_a_run_goes_on_when_nobody_reads_it_any_more(tree: Tree) -> None:
 def test_a_node_that_will_not_stop_is_killed(tree: Tree) -> None:
     module = tree.path / 'scenarios' / 'runner' / 'process.py'
     text = module.read_text()
-    assert 'SIGINT: 8.0, signal.SIGTERM: 3.0' in text
+    assert 'SIGTERM: 8.0, signal.SIGINT: 3.0' in text
     module.write_text(
-        text.replace('SIGINT: 8.0, signal.SIGTERM: 3.0', 'SIGINT: 1, signal.SIGTERM: 1')
+        text.replace('SIGTERM: 8.0, signal.SIGINT: 3.0', 'SIGTERM: 1, signal.SIGINT: 1')
     )
     tree.behave('plant', 'stubborn')
     code, output = tree.run()
@@ -194,6 +195,42 @@ def test_the_set_up_is_interrupted_where_that_was_ignored(tree: Tree) -> None:
     output, _ = process.communicate(timeout=20)
     assert process.returncode == -signal.SIGINT, output
     assert not tree.out.exists()
+
+
+def test_an_interrupt_of_the_script_alone_is_heeded_after_what_it_waits_for(tree: Tree) -> None:
+    (tree.path / 'setup.sh').write_text(f'env sh -c "echo >{tree.path}/pids/setup up; sleep 0.5"\n')
+    process = tree.start('--out', str(tree.out))
+    tree.wait_started('setup')
+    (tree.path / 'pids' / 'setup').unlink()
+    process.send_signal(signal.SIGINT)
+    output, _ = process.communicate(timeout=20)
+    assert (process.returncode, output) == (-signal.SIGINT, '')
+    assert not tree.out.exists()
+
+
+def test_an_interrupt_before_the_first_line_of_the_runner_ends_it_without_a_word(
+    tree: Tree,
+) -> None:
+    held = tree.path / 'held'
+    slow = f'#!/bin/sh\nkill -INT $$\n: >{held}\nexec {sys.executable} "$@"\n'
+    tree.script(tree.path / 'slow' / 'python', slow)
+    with (tree.path / 'setup.sh').open('a') as setup:
+        setup.write(f'PATH={tree.path}/slow:$PATH\n')
+    assert tree.run() == (-signal.SIGINT, '')
+    assert held.exists()
+    assert not tree.out.exists()
+
+
+def test_a_node_that_does_not_listen_yet_ends_without_a_word(tree: Tree) -> None:
+    loading = f'#!{sys.executable}\nimport os, time\npids = {str(tree.path / "pids")!r}\n'
+    loading += "open(f'{pids}/watchers', 'w').write(str(os.getpid()))\ntime.sleep(60)\n"
+    tree.executable('maglev_monitor', 'watchers', loading)
+    process = tree.start('--out', str(tree.out))
+    tree.wait_started('watchers')
+    process.send_signal(signal.SIGINT)
+    output, _ = process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert 'Traceback' not in output
 
 
 def test_without_setpriv_the_nodes_run_all_the_same(tree: Tree) -> None:

@@ -50,8 +50,8 @@ def test_a_view_that_dies_is_told_and_the_flight_goes_on(tree: Tree, how: str) -
 
 def test_a_view_that_will_not_end_fails_nothing(tree: Tree) -> None:
     module = tree.path / 'scenarios' / 'runner' / 'process.py'
-    long = 'SIGINT: 8.0, signal.SIGTERM: 3.0'
-    module.write_text(module.read_text().replace(long, 'SIGINT: 1, signal.SIGTERM: 1'))
+    long = 'SIGTERM: 8.0, signal.SIGINT: 3.0'
+    module.write_text(module.read_text().replace(long, 'SIGTERM: 1, signal.SIGINT: 1'))
     tree.behave('view', 'stubborn')
     code, output = tree.run()
     assert code == 0, output

@@ -29,8 +29,8 @@ for file in "$tree/behaviour/$name@${out##*/}" "$tree/behaviour/$name"; do
   [[ ! -f $file || -n $what ]] || read -r what <"$file" || true
 done
 ended() { echo "$name" >>"$tree/ended"; exit "$1"; }
-trap 'ended 0' INT
-trap 'ended 143' TERM
+trap 'ended 130' INT
+trap 'ended 0' TERM
 echo $$ >"$tree/pids/$name" # from now on it can be told to end
 : >"$tree/up/$name${out//\//-}"
 case $what in
