@@ -51,9 +51,32 @@ stamp() { # FILE KEY
   mv -f -- "$1.new" "$1"
 }
 
-environment_done() { [[ -x $venv/bin/python ]] && stamped "$venv/.stamp" "$environment_key"; }
+# What has been made, to see what somebody has deleted since: names alone, which cost nothing.
+note_contents() { # FILE PATH...
+  local path
+  for path in "${@:2}"; do
+    [[ ! -e $path || $path == */__pycache__ || $path == *.dist-info ]] || printf '%s\n' "$path"
+  done >"$1"
+}
+
+whole() { # FILE
+  local path
+  [[ -f $1 ]] || return 0
+  while read -r path; do
+    [[ -e $path ]] || return
+  done <"$1"
+}
+
+note_environment() {
+  note_contents "$venv/.contents" "$venv"/{bin,lib,share}/* "$venv"/lib/python3*/site-packages/*
+}
+
+environment_done() {
+  [[ -x $venv/bin/python ]] && stamped "$venv/.stamp" "$environment_key" && whole "$venv/.contents"
+}
 build_done() {
-  stamped "$root/build/.stamp" "$build_key" && stamped "$root/install/.stamp" "$build_key"
+  stamped "$root/build/.stamp" "$build_key" && stamped "$root/install/.stamp" "$build_key" &&
+    whole "$root/build/.contents"
 }
 compiled() {
   stamped "$cache/numba/current" "$sources" && stamped "$cache/numba/$sources/.stamp" "$build_key"
@@ -68,16 +91,20 @@ everything_done() {
     { [[ $wanted != test ]] || test_done; }
 }
 
-# What was made for another place names that place throughout, so it is made anew: say why.
-say_moved() {
+# What was made for another place names that place throughout, so it is made anew.
+say_why_anew() {
   local made
-  [[ ! -f $venv/.stamp ]] || read -ra made <"$venv/.stamp"
-  [[ -z ${made:-} || ${made[-2]} == "$root" ]] ||
+  [[ -f $venv/.stamp ]] || return 0
+  read -ra made <"$venv/.stamp"
+  if [[ ${made[-2]} != "$root" ]]; then
     say "this folder has come from ${made[-2]}: its environment is made anew"
+  elif stamped "$venv/.stamp" "$environment_key"; then
+    say 'something in .venv is missing: it is made anew'
+  fi
 }
 
 make_venv() {
-  say_moved
+  say_why_anew
   check_own_venv
   check_python "$branch"
   check_compiler
@@ -108,13 +135,14 @@ fill_venv() {
       pip_install "${ours[@]}" -c "$venv/constraints.txt"
   fi
   ! wants_view || stamp "$venv/.view-stamp" "$view_key"
+  note_environment
   stamp "$venv/.stamp" "$environment_key"
 }
 
 make_packages() {
   check_compiler
   check_space 100 "$root"
-  if ! [[ -f $root/build/.stamp && -f $root/install/.stamp ]] ||
+  if ! [[ -f $root/build/.stamp && -f $root/install/.stamp ]] || ! whole "$root/build/.contents" ||
     ! stamped "$root/build/.environment" "$environment_key"; then
     rm -rf -- "$root/build" "$root/install"
   fi
@@ -125,6 +153,7 @@ make_packages() {
 make_messages() {
   build_packages --packages-select maglev_msgs tf2_msgs
   write_and_check_environment
+  note_contents "$root/build/.contents" "$root"/{build,install}/*
   stamp "$root/build/.environment" "$environment_key"
   stamp "$root/build/.stamp" "$build_key"
   stamp "$root/install/.stamp" "$build_key"
@@ -146,6 +175,7 @@ make_view() {
   check_space 100 "$root"
   step 'installing what the live view in the browser needs' \
     pip_install -r "$root/setup/requirements-view.txt" -c "$versions"
+  note_environment
   stamp "$venv/.view-stamp" "$view_key"
 }
 

@@ -292,6 +292,30 @@ def test_a_moved_folder_is_made_anew_and_says_so(machine: Machine, tmp_path: Pat
 
 
 @needs_wheels
+@pytest.mark.parametrize('deleted', [True, False])
+def test_a_venv_of_which_a_part_is_deleted_is_made_anew_and_says_so(
+    machine: Machine, deleted: bool
+) -> None:
+    (machine.bin / 'make').unlink()
+    packages = machine.root / '.venv' / 'lib' / 'python3.12' / 'site-packages'
+    for folder in (packages / 'numpy', packages / 'yaml', machine.root / '.venv' / 'bin'):
+        folder.mkdir(parents=True)
+    (machine.root / '.venv' / 'bin' / 'python').symlink_to(sys.executable)
+    functions = (ROOT / 'setup' / 'install.sh').read_text().removesuffix('\nmain\n')
+    script = f'{functions}\nchoose_branch\nfind_keys\ntouch "$venv/.made-by-setup"\n'
+    script += 'note_environment\nstamp "$venv/.stamp" "$environment_key"\n'
+    (machine.root / 'setup' / 'made.sh').write_text(script)
+    made = [machine.bin / 'bash', machine.root / 'setup' / 'made.sh']
+    subprocess.run(made, env={'PATH': str(machine.bin)}, check=True)
+    if deleted:
+        (packages / 'yaml').rmdir()
+    code, lines = machine.setup()
+    assert code == 1
+    assert ('something in .venv is missing: it is made anew' in lines[0]) == deleted
+    assert 'missing: make' in lines[-1]
+
+
+@needs_wheels
 def test_no_network(machine: Machine) -> None:
     for name in ('python3', 'sleep'):
         (machine.bin / name).unlink(missing_ok=True)
