@@ -167,3 +167,12 @@ def test_a_batch_flies_machines_over_processes_as_one_by_one() -> None:
         assert each.mean_error == flight.mean_error
     with pytest.raises(TypeError, match="'plant' is what the machines are"):
         maglev.batch(machines, plant={'seed': 1})
+
+
+@pytest.mark.parametrize('jobs', [0, -1, 513, 1.5])
+def test_jobs_out_of_bounds_are_refused_by_name(jobs: Any) -> None:
+    words = re.escape(f"'jobs' is {jobs}, it must be a whole number from 1 to 512")
+    with pytest.raises(ParameterError, match=words):
+        maglev.sweep('controller.y.bandwidth', [100.0], 'hold', duration=0.1, jobs=jobs)
+    with pytest.raises(ParameterError, match=words):
+        maglev.batch([{}], 'hold', duration=0.1, jobs=jobs)

@@ -85,7 +85,8 @@ def sweep(
     ``sweep('controller.y.bandwidth', (100.0, 200.0), 'ellipse', duration=5.0)``; all else is given
     as to :func:`~maglev_study.flight.fly`. In processes of their own with more than one of
     ``jobs``. A value that is refused, or with which the platen is given up or the law fails, has
-    its reason in the result. Raises ParameterError for a name that no parameter of a node has.
+    its reason in the result. Raises ParameterError for a name that no parameter of a node has, and
+    for ``jobs`` that are no whole number from 1 to 512.
     """
     node, dot, name = parameter.partition('.')
     if node not in NODES or not dot:
@@ -117,13 +118,14 @@ def batch(
     is what :func:`~maglev_study.flight.fly` takes for ``plant``, and all else is given as to it.
     ``jobs`` processes, by default one for each core; equal calls give equal results, bit for bit,
     however many. A machine that is refused, or given up, or on which the law fails, has its reason
-    in the result. Raises TypeError for what is no machine.
+    in the result. Raises TypeError for what is no machine, ParameterError for ``jobs`` as
+    :func:`sweep` does.
     """
     if 'plant' in given:
         raise TypeError("'plant' is what the machines are")
     given |= {'trajectory': trajectory, 'duration': duration}
     wanted = [(machine, {**given, 'plant': machine}) for machine in machines]
-    return _fly_each(wanted, jobs or os.cpu_count() or 1)
+    return _fly_each(wanted, (os.cpu_count() or 1) if jobs is None else jobs)
 
 
 def _fly_each(wanted: Sequence[tuple[Any, Mapping[str, Any]]], jobs: int) -> list[Swept]:

@@ -6,6 +6,7 @@ import multiprocessing
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
+from numbers import Integral
 from typing import Any, TypeVar
 
 import joblib
@@ -18,6 +19,8 @@ T = TypeVar('T')
 
 PATIENCE = 10.0
 """For a scheduler to answer [s]."""
+MOST_JOBS = 512
+"""Processes."""
 
 
 def results(
@@ -33,10 +36,12 @@ def results(
     cluster, where what a worker had that died is given to another. One thread a process.
 
     Raises what the function raises, OSError where the scheduler cannot be reached or gives up,
-    ParameterError for an address that is none, and
+    ParameterError for an address that is none and jobs out of bounds, and
     :class:`~maglev_model.optional.MissingLibraryError` for a scheduler without Dask, and for
     workers without these packages.
     """
+    if not isinstance(jobs, Integral) or not 1 <= jobs <= MOST_JOBS:
+        raise ParameterError(f"'jobs' is {jobs!r}, it must be a whole number from 1 to {MOST_JOBS}")
     if not tasks:
         return
     if scheduler:
