@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
@@ -112,7 +113,9 @@ def namespace(name: str, value: str) -> str:
 
 
 def folder(name: str, value: str) -> str:
-    """The name of a folder."""
+    """The name of a folder, other than the root of all."""
     if not value:
         raise WrongUseError(f'{name} needs a folder')
+    if os.path.realpath(value) == '/':
+        raise WrongUseError(f"{name} is '{value}', it must be a folder other than the root")
     return value
