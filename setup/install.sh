@@ -61,7 +61,7 @@ note_contents() { # FILE PATH...
 
 whole() { # FILE
   local path
-  [[ -f $1 ]] || return 0
+  [[ -f $1 ]] || return
   while read -r path; do
     [[ -e $path ]] || return
   done <"$1"
@@ -112,6 +112,7 @@ make_venv() {
   check_space 1300 "$root"
   local system=()
   [[ $branch == wheels ]] || system=(--system-site-packages)
+  rm -f -- "$venv/.stamp" "$venv/.view-stamp" # first: rm may be killed on its way
   rm -rf -- "$venv"
   mkdir -- "$venv"
   touch -- "$venv/.made-by-setup"
