@@ -8,7 +8,7 @@ from bridge_flight import HOME
 
 from maglev_hw_bridge.diagnosis import _explanations, diagnose
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_hw_bridge.response import Twins, rubbing
+from maglev_hw_bridge.response import Twins, friction_variants
 from maglev_model.parameters import build
 
 PEAK = 1.5
@@ -16,7 +16,7 @@ PEAK = 1.5
 
 @pytest.fixture(scope='module')
 def foretold() -> np.ndarray:
-    twins = Twins(rubbing(build(BridgeParameters, HOME)), PEAK)
+    twins = Twins(friction_variants(build(BridgeParameters, HOME)), PEAK)
     moved = [twins.phase(phase, np.zeros(2)) for phase in range(12)]
     return np.stack(moved, axis=1)[..., None, :]
 

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from maglev_model.axes import AXES, FloatArray
 from maglev_model.parameters import ParameterError, parameter
-from maglev_model.plugins import told
+from maglev_model.plugins import describe_error
 
 if TYPE_CHECKING:
     from maglev_controller.parameters import ControllerParameters
@@ -200,4 +200,4 @@ class ForeignLaw:
     def _fail(self, error: BaseException) -> None:
         if isinstance(error, KeyboardInterrupt):
             raise error
-        self.fault = f'the law {self.name} raised {told(error)}'
+        self.fault = f'the law {self.name} raised {describe_error(error)}'

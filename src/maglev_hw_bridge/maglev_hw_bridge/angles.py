@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_hw_bridge.response import Twins, rubbing, turned
+from maglev_hw_bridge.response import Twins, angle_variants, friction_variants
 from maglev_model.axes import FloatArray
 
 MOTORS = 4
@@ -38,7 +38,7 @@ class Angles(NamedTuple):
         return bool(np.all(self.likeness > _LIKE))
 
 
-class Seen:
+class PhaseResponses:
     """What the phases moved, (12, 2, p, 6) [m]: phase, the current's sign (+, -), place, encoder.
 
     ``places``: x, z of the platen before each phase, (12, p, 2) [m].
@@ -53,9 +53,9 @@ class Seen:
     def near(self, foretold: FloatArray) -> Angles:
         """Angles within 0.35 rad of those believed in, each with the friction that suits best.
 
-        ``foretold``: what the twins of :func:`rubbing` would move, (n, 12, 2, p, 6) [m].
+        ``foretold``: what the twins of :func:`friction_variants` would move, (n, 12, 2, p, 6) [m].
         """
-        machines, found = rubbing(self._parameters), []
+        machines, found = friction_variants(self._parameters), []
         for motor in range(MOTORS):
             likeness = self._likeness(motor, foretold[:, _phases(motor)])
             suits = int(np.argmax(likeness))
@@ -78,7 +78,7 @@ class Seen:
         self, motor: int, parameters: BridgeParameters, angles: Iterable[float]
     ) -> FloatArray:
         """How much this motor resembles the same one with its angle off by each [rad]."""
-        twins = Twins(turned(parameters, angles), self._peak)
+        twins = Twins(angle_variants(parameters, angles), self._peak)
         moved = [
             [twins.phase(phase, place) for place in self._places[phase]] for phase in _phases(motor)
         ]  # phase, place, n, sign, encoder

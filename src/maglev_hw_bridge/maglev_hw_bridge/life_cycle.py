@@ -24,7 +24,7 @@ from maglev_hw_bridge.memory import Memory
 from maglev_hw_bridge.mode import Mode
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES
-from maglev_model.plugins import told
+from maglev_model.plugins import describe_error
 from maglev_model.stage import STOPPED_SINCE, EncoderSample, Fault, StageError
 
 FloatArray = NDArray[np.float64]
@@ -118,7 +118,7 @@ class StageLife(abc.ABC):
         except DriverError:
             raise
         except Exception as error:
-            raise DriverError(f'{whose} raised {told(error)}') from error
+            raise DriverError(f'{whose} raised {describe_error(error)}') from error
         if left := np.count_nonzero(np.all(rows == _BEFORE, axis=0)):
             raise DriverError(
                 f"{whose} left {left} of the 6 encoders out: 'counts' and 'read' must write what "

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
-from maglev_hw_bridge.angles import TOLERANCE, Angles, Seen
+from maglev_hw_bridge.angles import TOLERANCE, Angles, PhaseResponses
 from maglev_hw_bridge.diagnosis import diagnose
 from maglev_hw_bridge.operators import Act, Operator
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.proof import WrongError
-from maglev_hw_bridge.response import Twins, rubbing
-from maglev_hw_bridge.signal_parameters import ENCODER_NAMES, PHASE_NAMES
+from maglev_hw_bridge.response import Twins, friction_variants
+from maglev_hw_bridge.signal_parameters import ENCODER_NAMES, PHASE_NAMES, PHASES
 from maglev_model.axes import FloatArray
 
 _PLACES = (Act.MIDDLE, Act.BESIDE, Act.BETWEEN)
@@ -33,34 +34,49 @@ def prove_phases(
     way and the other, (2, 6) [m]. Where two explanations look alike the operator moves the platen
     on, for elsewhere they do not. Raises WrongError, and what ``pulse`` raises.
     """
-    twins = Twins(rubbing(parameters), peak)
-    seen: list[list[FloatArray]] = []
-    foretold: list[list[FloatArray]] = []
-    places: list[list[FloatArray]] = []
+    twins = Twins(friction_variants(parameters), peak)
+    looks = []
     for act in _PLACES:
         operator.act(act)
         _near_the_middle(parameters, read()[4:])
-        for found in (seen, foretold, places):
-            found.append([])
-        for phase, name in enumerate(PHASE_NAMES):
-            places[-1].append(read()[4:])
-            foretold[-1].append(twins.phase(phase, places[-1][-1]))
-            seen[-1].append(pulse(phase))
-            tell(f'  {name}: {_in_words(seen[-1][-1])}')
-        moved = np.transpose(seen, (1, 2, 0, 3))
-        expected = np.transpose(foretold, (2, 1, 3, 0, 4))
-        angles = Seen(parameters, peak, moved, np.transpose(places, (1, 0, 2)))
-        finding = diagnose(moved, expected)
-        if finding.explanations != 1 and (off := angles.anywhere()).explain:
-            _refuse_turned(parameters, off)
+        looks.append([_look(phase, twins, read, pulse, tell) for phase in range(PHASES)])
+        seen = np.transpose([[one.seen for one in look] for look in looks], (1, 2, 0, 3))
+        foretold = np.transpose([[one.foretold for one in look] for look in looks], (2, 1, 3, 0, 4))
+        places = np.transpose([[one.place for one in look] for look in looks], (1, 0, 2))
+        responses = PhaseResponses(parameters, peak, seen, places)
+        finding = diagnose(seen, foretold)
+        if finding.explanations != 1 and (angles := responses.anywhere()).explain:
+            _refuse_angles(parameters, angles)
         if finding.explanations != 2:
             break
         tell(f'  {finding.text}')
     if not finding.fine:
         raise WrongError(finding.text)
     tell(f'  {finding.text}')
-    _refuse_turned(parameters, angles.near(expected))
+    _refuse_angles(parameters, responses.near(foretold))
     tell(f'  electrical angles are as believed within {TOLERANCE:g} rad')
+
+
+class _Look(NamedTuple):
+    """What one phase moved at one place, and what it should have."""
+
+    place: FloatArray  # x, z (2,) [m]
+    seen: FloatArray  # (2, 6) [m]
+    foretold: FloatArray  # by each twin (n, 2, 6) [m]
+
+
+def _look(
+    phase: int,
+    twins: Twins,
+    read: Callable[[], FloatArray],
+    pulse: Callable[[int], FloatArray],
+    tell: Callable[[str], None],
+) -> _Look:
+    place = read()[4:]
+    foretold = twins.phase(phase, place)
+    seen = pulse(phase)
+    tell(f'  {PHASE_NAMES[phase]}: {_in_words(seen)}')
+    return _Look(place, seen, foretold)
 
 
 def _near_the_middle(parameters: BridgeParameters, place: FloatArray) -> None:
@@ -73,7 +89,7 @@ def _near_the_middle(parameters: BridgeParameters, place: FloatArray) -> None:
         )
 
 
-def _refuse_turned(parameters: BridgeParameters, angles: Angles) -> None:
+def _refuse_angles(parameters: BridgeParameters, angles: Angles) -> None:
     """Raises WrongError where one is further off than it may seem."""
     believed = parameters.commutation.offset
     texts = [

@@ -99,12 +99,12 @@ class Pulses:
         return np.array(self._encoders.arrays.length[4:])
 
 
-def rubbing(parameters: BridgeParameters) -> list[BridgeParameters]:
+def friction_variants(parameters: BridgeParameters) -> list[BridgeParameters]:
     """The same machine with other frictions of its guides, for :class:`Twins`; itself first."""
     return [_rubbing(parameters, *factors) for factors in _FRICTIONS]
 
 
-def turned(parameters: BridgeParameters, angles: Iterable[float]) -> list[BridgeParameters]:
+def angle_variants(parameters: BridgeParameters, angles: Iterable[float]) -> list[BridgeParameters]:
     """The same machine with all motors' electrical angles off by each [rad], for :class:`Twins`."""
     commutation = parameters.commutation
     return [

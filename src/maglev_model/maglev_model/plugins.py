@@ -67,7 +67,7 @@ def plugin_function(
         except ParameterError:
             raise
         except Exception as error:
-            raise ParameterError(f'{whose} raised {told(error)}') from error
+            raise ParameterError(f'{whose} raised {describe_error(error)}') from error
         if not isinstance(found, gives):
             raise ParameterError(
                 f'{whose} returned {type(found).__name__}: it must be {gives.__name__}'
@@ -77,7 +77,7 @@ def plugin_function(
     return checked
 
 
-def told(error: BaseException) -> str:
+def describe_error(error: BaseException) -> str:
     """An exception in a line, and where in what was called it comes from."""
     frames = traceback.extract_tb(error.__traceback__)[1:]
     where = (

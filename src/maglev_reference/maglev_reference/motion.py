@@ -8,7 +8,7 @@ import numpy as np
 
 from maglev_model.axes import FloatArray
 from maglev_model.parameters import ParameterError
-from maglev_model.plugins import told
+from maglev_model.plugins import describe_error
 from maglev_model.quintic import evaluate_quintic, quintic_coefficients
 
 
@@ -53,7 +53,9 @@ class Checked:
         try:
             found = Kinematics(*map(np.asarray, self._motion.evaluate(time)))
         except Exception as error:
-            raise ParameterError(f'{self._given}, whose motion raised {told(error)}') from error
+            raise ParameterError(
+                f'{self._given}, whose motion raised {describe_error(error)}'
+            ) from error
         for name, part in zip(Kinematics._fields, found, strict=True):
             if part.shape != (len(time), 5) or part.dtype.kind not in 'fi':
                 raise ParameterError(
