@@ -21,8 +21,8 @@ from maglev_hw_bridge.drivers.emulated import EmulatedBoards
 from maglev_hw_bridge.drivers.quanser import QuanserDriver
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.stage import BridgeStage, Mode
+from maglev_model.contract.stage import Stage
 from maglev_model.parameters import build
-from maglev_model.stage import Stage
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
 

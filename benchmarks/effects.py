@@ -15,8 +15,8 @@ import time
 from pathlib import Path
 
 from maglev_model.compiled import compiled
+from maglev_model.compiled.records import Block
 from maglev_model.parameters import build, read_yaml
-from maglev_model.records import Block
 from maglev_plant.dynamics import advance
 from maglev_plant.encoder import encode
 from maglev_plant.parameters import PlantParameters

@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from maglev_controller.control_arrays import MODEL, RECORDS
 from maglev_controller.regulator import Regulator
+from maglev_controller.step.arrays import MODEL, RECORDS
 from maglev_model.machine import Machine
 from maglev_plant.arrays import StageArrays
 from maglev_plant.simulation import SimulatedStage

@@ -43,10 +43,10 @@ from mutation import (
 
 _CAMPAIGN = ('test/study/faults/test_campaign.py',)
 _BRIDGE = (
-    *bridge_tests('encoders', 'leaps', 'doubts', 'roll_call', 'standing_still', 'watch'),
+    *bridge_tests('encoders', 'leaps', 'doubt', 'roll_call', 'standing_still', 'watch'),
     *bridge_tests('observer', 'board', 'way_down', 'unseen', 'rough_rig', 'amplifiers', 'guard'),
     *bridge_tests('knock', 'resting', 'life_cycle', 'memory', 'landing'),
-    'test/model/test_stage_contract.py',
+    'test/model/contract/test_stage.py',
     *bridge_tests('faults', 'sensing', 'driver_calls', 'lines_and_offsets', 'boards_that_fail'),
     'test/study/faults/test_judge.py',
     *bridge_tests('controllers', 'commission'),
@@ -58,13 +58,16 @@ LOOKED_AT_BY: dict[str, tuple[tuple[str, ...], ...]] = {
     **{
         f'maglev_hw_bridge.{name}': (_BRIDGE, _CAMPAIGN)
         for name in (
-            *('guard', 'leaps', 'standing_still', 'observer', 'knock', 'landing', 'stage'),
-            *('life_cycle', 'amplifiers', 'encoders', 'board', 'drivers.quanser'),
+            *('sensing.guard', 'sensing.leaps', 'sensing.standing_still', 'sensing.observer'),
+            *('sensing.knock', 'landing', 'stage', 'life_cycle', 'amplifiers', 'encoders'),
+            *('board', 'drivers.quanser'),
         )
     },
     'maglev_controller.supervision': (_CONTROLLER, _CAMPAIGN),
     'maglev_controller.landing': (_CONTROLLER, _CAMPAIGN),
-    'maglev_model.controller_watch': (('test/model/test_controller_watch.py', 'test/node'),),
+    'maglev_model.contract.controller_watch': (
+        ('test/model/contract/test_controller_watch.py', 'test/node'),
+    ),
     'maglev_model.inverse': ((*_INVERSE, *_CONTROLLER), _CAMPAIGN),
 }
 """Modules, and the tests that look at them, stage by stage, the fastest first."""

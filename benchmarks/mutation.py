@@ -41,8 +41,11 @@ Edit = Callable[[], None]
 
 
 def bridge_tests(*names: str) -> tuple[str, ...]:
-    """Files of the bridge's tests."""
-    return tuple(f'test/hw_bridge/test_{name}.py' for name in names)
+    """Files of the bridge's tests, in whatever folder they lie."""
+    folder = ROOT / 'test' / 'hw_bridge'
+    return tuple(
+        str(path.relative_to(ROOT)) for name in names for path in folder.rglob(f'test_{name}.py')
+    )
 
 
 class Mutant(NamedTuple):

@@ -18,7 +18,7 @@ import rclpy
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.task import Future
 
-from maglev_model.wire import Incoming, Outgoing
+from maglev_model.contract.wire import Incoming, Outgoing
 from maglev_node.dds import prepare_middleware
 from maglev_node.polling import PolledSubscription, PollingNode
 from maglev_node.topics import (

@@ -20,7 +20,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1] / 'test' / 'support'))
 from unheard import unheard
 
-from maglev_model.wire import KEPT, Outgoing
+from maglev_model.contract.wire import KEPT, Outgoing
 from maglev_node.realtime import keep_heap
 from maglev_node.topics import KEYS, MEASUREMENT
 

@@ -51,16 +51,16 @@ TESTS: dict[str, tuple[str, ...]] = {
         'test/model/test_attraction_shares.py',
         'test/model/test_single_motor_inverse.py',
     ),
-    'maglev_model.controller_watch': ('test/model/test_controller_watch.py',),
+    'maglev_model.contract.controller_watch': ('test/model/contract/test_controller_watch.py',),
     'maglev_controller.landing': ('test/controller/test_landing.py',),
     'maglev_controller.reference_reach': ('test/controller/test_reference_reach.py',),
     'maglev_hw_bridge.amplifiers': bridge_tests('amplifiers'),
     'maglev_hw_bridge.encoders': bridge_tests('encoders'),
-    'maglev_hw_bridge.observer': bridge_tests('observer', 'guard'),
-    'maglev_hw_bridge.leaps': bridge_tests('leaps'),
-    'maglev_hw_bridge.knock': bridge_tests('knock_bounds'),
-    'maglev_hw_bridge.standing_still': bridge_tests('doubts', 'roll_call', 'standing_still'),
-    'maglev_hw_bridge.guard': bridge_tests('watch', 'guard'),
+    'maglev_hw_bridge.sensing.observer': bridge_tests('observer', 'guard'),
+    'maglev_hw_bridge.sensing.leaps': bridge_tests('leaps'),
+    'maglev_hw_bridge.sensing.knock': bridge_tests('knock_bounds'),
+    'maglev_hw_bridge.sensing.standing_still': bridge_tests('doubt', 'roll_call', 'standing_still'),
+    'maglev_hw_bridge.sensing.guard': bridge_tests('watch', 'guard'),
     'maglev_hw_bridge.landing': bridge_tests('way_down', 'way_down_bounds'),
 }
 """Modules that are compiled, and their own tests, which do not fly."""
@@ -84,7 +84,7 @@ FLYING: dict[str, tuple[str, ...]] = {
         'what_a_life_leaves', 'homing', 'life_cycle', 'memory'
     ),
     'maglev_hw_bridge.memory': bridge_tests('memory'),
-    'maglev_hw_bridge.proof': bridge_tests('proof_in_turn', 'proof'),
+    'maglev_hw_bridge.commissioning.proof': bridge_tests('proof_in_turn', 'proof'),
     'maglev_hw_bridge.stage': bridge_tests(
         'stage_rest', 'stage_samples', 'stage_faults', 'what_a_life_leaves'
     ),
@@ -118,8 +118,8 @@ def _interpret() -> None:
     """Leave compiled functions as they are written, and let records have attributes there too."""
     import numpy as np
 
-    from maglev_model import ahead
-    from maglev_model.records import Record
+    from maglev_model.compiled import ahead
+    from maglev_model.compiled.records import Record
 
     ahead.stand_in_by(lambda function, make: function)
     hold = Record._hold

@@ -3,7 +3,8 @@
     compile_ahead.py answer|stage
 
 Of each half what nodes call goes into a file of its own, with which they do without Numba (see
-:mod:`maglev_model.ahead`), all of it into Numba's cache. Two halves, for two processes at once.
+:mod:`maglev_model.compiled.ahead`), all of it into Numba's cache. Two halves, for two processes at
+once.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from maglev_model import ahead, build_ahead
+from maglev_model.compiled import ahead, build_ahead
 
 LEVEL = np.array([0.025, 0.0, 0.0, 0.0, 0.0])
 

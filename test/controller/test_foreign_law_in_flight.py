@@ -18,10 +18,10 @@ from maglev_controller.design_process import DesignProcess
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
 from maglev_controller.supervision import Supervisor
-from maglev_model.controller_watch import Status
-from maglev_model.modes import Mode
+from maglev_model.contract.controller_watch import Status
+from maglev_model.contract.modes import Mode
+from maglev_model.contract.phases import Phase
 from maglev_model.parameters import build
-from maglev_model.phases import Phase
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
 

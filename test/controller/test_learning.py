@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from maglev_controller.learning import IterativeLearning, iterative_learning
-from maglev_controller.learning_step import DONE, GREW
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
+from maglev_controller.step.learning import DONE, GREW
 from maglev_controller.supervision import Supervisor
 from maglev_model.axes import X, Y
+from maglev_model.contract.phases import Phase
 from maglev_model.parameters import ParameterError, build, from_yaml, replace
-from maglev_model.phases import Phase
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
 from maglev_study.closed_loop import run

@@ -10,10 +10,10 @@ from maglev_controller.bumpless_transfer import model_maps
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
 from maglev_controller.supervision import Supervisor
-from maglev_model.controller_watch import Status
-from maglev_model.modes import Mode
+from maglev_model.contract.controller_watch import Status
+from maglev_model.contract.modes import Mode
+from maglev_model.contract.phases import Phase
 from maglev_model.parameters import build
-from maglev_model.phases import Phase
 
 
 def drifting(supervisor: Supervisor, axis: int, speed: float, samples: int) -> int:

@@ -7,8 +7,8 @@ import pytest
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.supervision import Supervisor
-from maglev_model.modes import Mode
-from maglev_model.phases import Phase
+from maglev_model.contract.modes import Mode
+from maglev_model.contract.phases import Phase
 
 REST = np.array([0.031, 0.0, 0.0, 0.0, 0.0])
 

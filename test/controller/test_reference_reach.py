@@ -8,7 +8,7 @@ from supervised import HOVER
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.reference_reach import ReferenceReach
-from maglev_controller.sample_step import LARGEST_REFERENCE
+from maglev_controller.step.sample import LARGEST_REFERENCE
 from maglev_model.axes import AXES
 
 PARAMETERS = ControllerParameters()

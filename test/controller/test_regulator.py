@@ -12,7 +12,7 @@ from bench import HOVER, ZERO, Bench
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import MeasurementFault
-from maglev_controller.sample_step import answer_sample
+from maglev_controller.step.sample import answer_sample
 from maglev_model.axes import AXES
 from maglev_model.machine import MachineParameters, machine_constants
 from maglev_model.motor import L_h

@@ -13,9 +13,9 @@ from maglev_controller.learning import iterative_learning
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
 from maglev_controller.supervision import Supervisor
-from maglev_model.modes import Mode
+from maglev_model.contract.modes import Mode
+from maglev_model.contract.phases import Phase
 from maglev_model.parameters import ParameterError, build
-from maglev_model.phases import Phase
 
 ASIDE = np.array([0.025, 0.01, 0.0, 0.0, 0.0])
 

@@ -9,10 +9,10 @@ from supervised import HOVER, QUICK, STOP, Flight
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.supervision import Supervisor
 from maglev_model.axes import AXES
-from maglev_model.controller_watch import Status
-from maglev_model.modes import Mode
+from maglev_model.contract.controller_watch import Status
+from maglev_model.contract.modes import Mode
+from maglev_model.contract.phases import Phase
 from maglev_model.parameters import build
-from maglev_model.phases import Phase
 
 
 @pytest.mark.parametrize(('axis', 'value'), [(0, 0.01), (0, 0.034), (1, np.nan), (4, 0.1)])

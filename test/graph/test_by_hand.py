@@ -15,7 +15,7 @@ from std_srvs.srv import Trigger
 
 from maglev_controller.node import ControllerNode
 from maglev_controller.parameters import ControllerParameters
-from maglev_model.modes import Mode
+from maglev_model.contract.modes import Mode
 from maglev_model.parameters import ParameterError, replace
 from maglev_msgs.msg import Measurement
 from maglev_node.topics import MEASUREMENT, sample_qos

@@ -12,7 +12,7 @@ import pytest
 from flight import BRISK, ELLIPSE
 from graph import PARAMS, ROOT, Nodes, Process, executable
 
-from maglev_model import ahead
+from maglev_model.compiled import ahead
 
 SUPPORT = ROOT / 'test' / 'support'
 STAGES = {

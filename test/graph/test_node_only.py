@@ -10,8 +10,8 @@ from maglev_controller.node import ControllerNodeParameters
 from maglev_controller.parameters import ControllerParameters
 from maglev_hw_bridge.node import BridgeNodeParameters
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_model.node_only import NODE_ONLY
 from maglev_model.parameters import ParameterError, from_yaml, specs, to_yaml
+from maglev_model.parameters.node_only import NODE_ONLY
 from maglev_plant.node import PlantNodeParameters
 from maglev_plant.parameters import PlantParameters
 from maglev_reference.node import ReferenceNodeParameters

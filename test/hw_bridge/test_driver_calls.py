@@ -20,8 +20,8 @@ from maglev_hw_bridge.drivers import DriverError, WatchdogError, make_driver, qu
 from maglev_hw_bridge.drivers.quanser import QuanserDriver
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.stage import BridgeStage
+from maglev_model.contract.stage import StageError
 from maglev_model.parameters import ParameterError, build
-from maglev_model.stage import StageError
 
 COUNTS = np.arange(8, dtype=np.int32) * 100 - 300
 

@@ -10,8 +10,8 @@ from bridge_flight import Flight, ellipse, hover
 
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.stage import Mode
+from maglev_model.contract.stage import StageError
 from maglev_model.parameters import build
-from maglev_model.stage import StageError
 
 LOWER_STOP = 0.031
 SOFT = 0.05  # [m/s]

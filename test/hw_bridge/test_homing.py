@@ -12,8 +12,8 @@ from wired import bridge
 from maglev_hw_bridge.encoders import HomingError
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.stage import BridgeStage, Mode
+from maglev_model.contract.stage import Fault, StageError
 from maglev_model.parameters import ParameterError, build
-from maglev_model.stage import Fault, StageError
 
 
 def test_no_home_at_the_start_is_no_stage(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,8 +15,8 @@ from maglev_hw_bridge.drivers.emulated import EmulatedBoards
 from maglev_hw_bridge.encoders import HomingError
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.stage import BridgeStage, Mode
+from maglev_model.contract.stage import StageError
 from maglev_model.parameters import ParameterError, build
-from maglev_model.stage import StageError
 
 LOWER_STOP, UPPER_STOP = 0.031, 0.018
 CALLS = (

@@ -16,8 +16,8 @@ from maglev_hw_bridge.drivers import DriverError
 from maglev_hw_bridge.memory import Memory, memory_file
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.stage import BridgeStage, Mode
+from maglev_model.contract.stage import Fault, StageError
 from maglev_model.parameters import ParameterError, build, replace
-from maglev_model.stage import Fault, StageError
 
 
 def kept(path: Path, **overrides: object) -> BridgeStage:

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from made_up import LOWER_STOP, Calls, active, aloft, watched
 
-from maglev_hw_bridge import amplifiers, guard
+from maglev_hw_bridge import amplifiers
 from maglev_hw_bridge import stage as module
-from maglev_hw_bridge.guard_arrays import LOST, PUT_RIGHT
+from maglev_hw_bridge.sensing import guard
+from maglev_hw_bridge.sensing.guard_arrays import LOST, PUT_RIGHT
 from maglev_hw_bridge.stage import BridgeStage, Mode
-from maglev_model.stage import Fault
+from maglev_model.contract.stage import Fault
 
 
 def test_what_lands_is_not_begun_anew_by_who_asks_for_it() -> None:

@@ -8,12 +8,13 @@ from bridge_flight import HOME
 from made_up import LOWER_STOP, Calls, active, aloft, refusing, volts, watched
 from wired import OFFSET, bridge
 
-from maglev_hw_bridge import amplifiers, guard
+from maglev_hw_bridge import amplifiers
 from maglev_hw_bridge.drivers import DriverError
 from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.sensing import guard
 from maglev_hw_bridge.stage import BridgeStage, Mode
+from maglev_model.contract.stage import EncoderSample, Fault, StageError, Truth
 from maglev_model.parameters import build
-from maglev_model.stage import EncoderSample, Fault, StageError, Truth
 
 UP = np.full(4, 0.1)
 ZERO = np.zeros(4)

@@ -15,8 +15,8 @@ from maglev_hw_bridge.drivers import DriverError
 from maglev_hw_bridge.drivers.emulated import EmulatedBoards
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.stage import BridgeStage, Mode
+from maglev_model.contract.stage import Fault, StageError
 from maglev_model.parameters import build
-from maglev_model.stage import Fault, StageError
 
 LOAD = 0.4  # I2t that was left of a life
 

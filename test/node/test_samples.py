@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 
-from maglev_model.wire import TOPIC_TYPES, Incoming, Outgoing
+from maglev_model.contract.wire import TOPIC_TYPES, Incoming, Outgoing
 from maglev_msgs.msg import Currents
 from maglev_node import samples
 from maglev_node.stamp import nanoseconds, set_stamp

@@ -10,8 +10,8 @@ from made_up_node import MadeUpNode
 from made_up_stage import MadeUpStage, currents, start, start_realtime
 from rosgraph_msgs.msg import Clock
 
-from maglev_model.stage import StageError
-from maglev_model.wire import KEPT
+from maglev_model.contract.stage import StageError
+from maglev_model.contract.wire import KEPT
 from maglev_msgs.msg import Measurement, PlantState
 from maglev_node.sampling import Sampling
 from maglev_node.topics import MEASUREMENT, TRUE_STATE

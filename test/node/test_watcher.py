@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from maglev_model.wire import Outgoing
+from maglev_model.contract.wire import Outgoing
 from maglev_node.topics import KEYS, MEASUREMENT
 
 WATCHER = """

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from maglev_model.contract.stage import EncoderSample
 from maglev_model.parameters import build
-from maglev_model.stage import EncoderSample
 from maglev_plant.encoder import gaussian
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage

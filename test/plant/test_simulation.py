@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.integrate import DOP853
 
 from maglev_model.compiled import compiled
+from maglev_model.contract.stage import EncoderSample
 from maglev_model.machine import Machine, MachineParameters, machine_constants
 from maglev_model.motor import (
     L_h,
@@ -23,7 +24,6 @@ from maglev_model.motor import (
     vertical_force,
 )
 from maglev_model.parameters import build, read_yaml
-from maglev_model.stage import EncoderSample
 from maglev_plant.dynamics import advance
 from maglev_plant.encoder import encode
 from maglev_plant.parameters import PlantParameters

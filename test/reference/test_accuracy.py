@@ -15,8 +15,8 @@ from maglev_controller.laws import control_law
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
 from maglev_model.axes import AXES
+from maglev_model.contract.phases import Phase
 from maglev_model.parameters import ParameterError, build, from_yaml, read_yaml, replace
-from maglev_model.phases import Phase
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
 from maglev_reference import match

@@ -10,8 +10,8 @@ import pytest
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
 from maglev_model.axes import FloatArray
+from maglev_model.contract.phases import Phase
 from maglev_model.parameters import from_yaml, replace
-from maglev_model.phases import Phase
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
 from maglev_reference.check import UnreachableError, utilisation

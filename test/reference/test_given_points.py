@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from maglev_model.axes import AXES
-from maglev_model.modes import Mode
+from maglev_model.contract.modes import Mode
+from maglev_model.contract.phases import Phase
 from maglev_model.parameters import build
-from maglev_model.phases import Phase
 from maglev_reference.check import UnreachableError
 from maglev_reference.given_points import Candidate, Point, Through, step
 from maglev_reference.motion import Quintic, State

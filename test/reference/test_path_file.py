@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from maglev_model.contract.phases import Phase
 from maglev_model.parameters import ParameterError, build
-from maglev_model.phases import Phase
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.path_file import PathFile
 from maglev_reference.timeline import Timeline

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from maglev_model.modes import Mode
+from maglev_model.contract.modes import Mode
+from maglev_model.contract.phases import Phase
 from maglev_model.parameters import build
-from maglev_model.phases import Phase
 from maglev_reference.check import UnreachableError
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.run import ReferenceRun

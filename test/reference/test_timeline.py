@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import maglev_reference
+from maglev_model.contract.phases import Phase
 from maglev_model.geometry import motor_gaps
 from maglev_model.parameters import SHARED_GROUPS, build, from_yaml, read_yaml, specs, to_yaml
-from maglev_model.phases import Phase
 from maglev_reference.check import UnreachableError
 from maglev_reference.node import ReferenceNodeParameters
 from maglev_reference.parameters import ReferenceParameters

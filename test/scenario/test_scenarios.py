@@ -22,7 +22,7 @@ from page_client import PageClient, heights
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from maglev_model.phases import Phase
+from maglev_model.contract.phases import Phase
 from maglev_monitor.bag.compare import compare
 from maglev_monitor.bag.reader import Bag
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from maglev_model.axes import AXES, THETA, X, Y, Z
+from maglev_model.contract.phases import Phase
 from maglev_model.parameters import ParameterError, read_yaml, replace
-from maglev_model.phases import Phase
 from maglev_reference.parameters import ReferenceParameters
 from maglev_study.flight import ELLIPSE, ELLIPSE_4DOF, FlightRecord, fly
 

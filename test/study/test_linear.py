@@ -11,8 +11,8 @@ import pytest
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
 from maglev_model.axes import AXES
-from maglev_model.optional import MissingLibraryError
 from maglev_model.parameters import ParameterError, build
+from maglev_model.programs.optional import MissingLibraryError
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
 from maglev_study.closed_loop import run

@@ -9,9 +9,9 @@ import pytest
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
+from maglev_model.contract.phases import Phase
 from maglev_model.machine import MachineParameters
 from maglev_model.parameters import ParameterError, build, from_yaml, replace
-from maglev_model.phases import Phase
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
 from maglev_reference.parameters import ReferenceParameters

@@ -15,8 +15,8 @@ from maglev_hw_bridge.drivers.emulated import EmulatedBoards
 from maglev_hw_bridge.drivers.quanser import QuanserDriver
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.stage import BridgeStage, Mode
+from maglev_model.contract.stage import StageError
 from maglev_model.parameters import build
-from maglev_model.stage import StageError
 from maglev_study.references import ellipse_at
 
 HOME = {'homing.at_start': True, 'homing.x': 0.0, 'homing.z': 0.0}

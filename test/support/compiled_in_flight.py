@@ -15,9 +15,9 @@ from compiled_functions import compiled
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.supervision import Supervisor
-from maglev_model.modes import Mode
+from maglev_model.contract.modes import Mode
+from maglev_model.contract.phases import Phase
 from maglev_model.parameters import build
-from maglev_model.phases import Phase
 
 STOP, HOVER, STILL = np.array([0.031, 0, 0, 0, 0]), np.array([0.025, 0, 0, 0, 0]), np.zeros(5)
 

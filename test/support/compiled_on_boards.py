@@ -10,12 +10,12 @@ import sys
 from bridge_flight import HOME, Flight, ellipse
 from compiled_functions import compiled
 
-from maglev_hw_bridge.commission import Commissioning
+from maglev_hw_bridge.commissioning.commission import Commissioning
+from maglev_hw_bridge.commissioning.operators import EmulatedPerson
+from maglev_hw_bridge.commissioning.response import Pulses
 from maglev_hw_bridge.drivers.emulated import EmulatedBoards
 from maglev_hw_bridge.drivers.quanser import QuanserDriver
-from maglev_hw_bridge.operators import EmulatedPerson
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_hw_bridge.response import Pulses
 from maglev_hw_bridge.stage import Mode
 from maglev_model.parameters import build
 
@@ -60,5 +60,5 @@ def commission() -> None:
 
 
 {'landing': fly, 'commission': commission}[sys.argv[1]]()
-MADE_UP = 'maglev_hw_bridge.rig.', 'maglev_controller.'  # what flies, and who answers
+MADE_UP = 'maglev_hw_bridge.emulation.rig.', 'maglev_controller.'  # what flies, and who answers
 print({name for name in late if not name.startswith(MADE_UP)} or 'nothing')

@@ -25,7 +25,7 @@ from rclpy.serialization import deserialize_message
 from rclpy.task import Future
 from std_srvs.srv import SetBool, Trigger
 
-from maglev_model.wire import record_type
+from maglev_model.contract.wire import record_type
 from maglev_node.dds import prepare_middleware
 from maglev_node.polling import PolledSubscription, PollingNode
 from maglev_node.topics import KEYS, SAMPLE_TOPICS, sampled

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from maglev_hw_bridge import guard
 from maglev_hw_bridge.amplifiers import Amplifiers
-from maglev_hw_bridge.guard_arrays import GuardArrays
 from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.sensing import guard
+from maglev_hw_bridge.sensing.guard_arrays import GuardArrays
 from maglev_model.inverse import NO_LIMITS, Answer, exact_inverse
 from maglev_model.machine import machine_constants
 from maglev_model.platen import gaps_from_outputs

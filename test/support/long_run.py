@@ -17,7 +17,7 @@ import numpy as np
 from made_up_run import TOPICS, Encoder, make_run, open_bag
 from numpy.typing import NDArray
 
-from maglev_model.phases import Phase
+from maglev_model.contract.phases import Phase
 from maglev_monitor.bag.log_time import LogTimes
 from maglev_monitor.metrics.decoding import decode
 

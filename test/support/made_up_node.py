@@ -10,7 +10,7 @@ from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
 from rosgraph_msgs.msg import Clock
 
-from maglev_model.wire import Incoming
+from maglev_model.contract.wire import Incoming
 from maglev_msgs.msg import Measurement
 from maglev_node.stage_parameters import ClockedStageParameters
 from maglev_node.stamp import nanoseconds, set_stamp

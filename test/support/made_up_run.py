@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from maglev_model.controller_watch import Status
-from maglev_model.phases import Phase
+from maglev_model.contract.controller_watch import Status
+from maglev_model.contract.phases import Phase
 from maglev_monitor.bag.reader import Bag
 from maglev_monitor.bag.writer import BagWriter
 

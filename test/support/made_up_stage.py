@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from made_up_node import MadeUpNode
 
-from maglev_model.stage import EncoderSample, Fault, StageError, Truth
+from maglev_model.contract.stage import EncoderSample, Fault, StageError, Truth
 from maglev_msgs.msg import Currents
 from maglev_node.sampling import Sampling
 

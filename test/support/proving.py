@@ -7,11 +7,11 @@ from collections.abc import Callable
 import numpy as np
 
 from maglev_hw_bridge.amplifiers import Amplifiers
+from maglev_hw_bridge.commissioning.operators import EmulatedPerson
+from maglev_hw_bridge.commissioning.proof import Proof
 from maglev_hw_bridge.drivers.emulated import EmulatedBoards
 from maglev_hw_bridge.drivers.quanser import QuanserDriver
-from maglev_hw_bridge.operators import EmulatedPerson
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_hw_bridge.proof import Proof
 from maglev_model.parameters import build
 
 LINES = {'boards.stop_input': 0, 'boards.enable_output': 1}

@@ -11,7 +11,7 @@ import pkgutil
 import sys
 from pathlib import Path
 
-from maglev_model import ahead, build_ahead
+from maglev_model.compiled import ahead, build_ahead
 
 leave = os._exit
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from maglev_controller.supervision import Supervisor
-from maglev_model.modes import Mode
-from maglev_model.phases import Phase
+from maglev_model.contract.modes import Mode
+from maglev_model.contract.phases import Phase
 
 STOP = np.array([0.031, 0.0, 0.0, 0.0, 0.0])
 HOVER = np.array([0.025, 0.0, 0.0, 0.0, 0.0])

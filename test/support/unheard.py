@@ -16,7 +16,7 @@ from typing import Any
 
 import rclpy
 
-from maglev_model.wire import KEPT
+from maglev_model.contract.wire import KEPT
 from maglev_msgs.msg import Measurement
 from maglev_node.dds import prepare_middleware
 from maglev_node.realtime import keep_heap

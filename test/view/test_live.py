@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from made_up_run import Encoder, Run, make_run
 
-from maglev_model.phases import Phase
+from maglev_model.contract.phases import Phase
 from maglev_monitor.metrics.decoding import decode
 from maglev_view.parameters import WebParameters
 from maglev_view.web.guard import trusted

@@ -9,8 +9,8 @@ from typing import Final
 
 import numpy as np
 
-from maglev_controller.control_arrays import ControlArrays
 from maglev_controller.parameters import ControllerParameters
+from maglev_controller.step.arrays import ControlArrays
 from maglev_model.axes import FloatArray
 from maglev_model.parameters import ParameterError, values
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from maglev_controller.parameters import ControllerParameters
-from maglev_controller.voltage import USED
+from maglev_controller.step.voltage import USED
 from maglev_model.machine import machine_constants
 from maglev_model.motor import attraction_coefficients
 from maglev_model.parameters import ParameterError

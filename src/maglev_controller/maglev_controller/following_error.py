@@ -14,7 +14,7 @@ import numpy as np
 from maglev_controller.parameters import ControllerParameters
 from maglev_model.axes import AXES, UNITS, FloatArray
 from maglev_model.compiled import borrowing
-from maglev_model.records import Block, Record
+from maglev_model.compiled.records import Block, Record
 
 
 class FollowingArrays(Record):

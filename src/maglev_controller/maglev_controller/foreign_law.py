@@ -9,39 +9,22 @@ to the stage, which lands, or cuts the currents, when no currents come.
 
 from __future__ import annotations
 
-import dataclasses
 import time
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol
+from typing import Any, Final, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from maglev_controller.parameters import ControllerParameters
 from maglev_model.axes import AXES, FloatArray
-from maglev_model.parameters import ParameterError, parameter
-from maglev_model.plugins import describe_error
-
-if TYPE_CHECKING:
-    from maglev_controller.parameters import ControllerParameters
+from maglev_model.parameters import ParameterError
+from maglev_model.parameters.plugins import describe_error
 
 LARGEST: Final = 1e6
 """Magnitude of an answer from which on it is none [A, m/s², rad/s²]."""
 
 VIRTUAL_INPUT: Final = (5,)
 CURRENTS: Final = (2, 4)
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True)
-class ForeignLawParameters:
-    """What a law that is an object of one's own may take."""
-
-    time: float = parameter(
-        5e-4, 'time it may take for a sample, wall clock', unit='s', within=(1e-6, 0.1)
-    )
-    late_samples: int = parameter(
-        10,
-        'realtime: it may take longer this often in a row; then the controller lands',
-        within=(0, 1000),
-    )
 
 
 class Measurement(NamedTuple):
@@ -144,7 +127,7 @@ class ForeignLaw:
     def ask(self, gap: FloatArray, x: float, z: float, told: FloatArray) -> NDArray[Any] | None:
         """Its answer, checked; None, with the reason in ``fault``, when there is none.
 
-        ``told`` (5, 5) as :func:`~maglev_controller.foreign_sample.open_sample` writes it.
+        ``told`` (5, 5) as :func:`~maglev_controller.step.foreign_sample.open_sample` writes it.
         """
         if self.fault:
             return None

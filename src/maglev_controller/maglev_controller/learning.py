@@ -26,10 +26,11 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from maglev_controller.control_arrays import ControlArrays
 from maglev_controller.design.digits import rounded
 from maglev_controller.learning_parameters import LearningParameters
-from maglev_controller.learning_step import (
+from maglev_controller.parameters import ControllerParameters
+from maglev_controller.step.arrays import ControlArrays
+from maglev_controller.step.learning import (
     DONE,
     GREW,
     IDLE,
@@ -40,7 +41,6 @@ from maglev_controller.learning_step import (
     learn,
     look_ahead,
 )
-from maglev_controller.parameters import ControllerParameters
 from maglev_model.axes import AXES, FloatArray
 from maglev_model.parameters import ParameterError
 
@@ -55,7 +55,7 @@ _LEAST = 0.25  # of a count: rms errors below it do not grow
 
 
 class IterativeLearning:
-    """Learns over passes; ``arrays`` are what :mod:`~maglev_controller.learning_step` works on."""
+    """Learns over passes; ``arrays`` are what :mod:`~maglev_controller.step.learning` works on."""
 
     def __init__(self, parameters: ControllerParameters) -> None:
         """Raises ParameterError for a period that cannot be had, or a law that does not fit."""

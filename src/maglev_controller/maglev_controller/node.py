@@ -14,11 +14,11 @@ from std_srvs.srv import SetBool, Trigger
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.supervision import Supervisor
-from maglev_model.controller_watch import NOBODY
-from maglev_model.modes import Mode
+from maglev_model.contract.controller_watch import NOBODY
+from maglev_model.contract.modes import Mode
+from maglev_model.contract.phases import Phase
+from maglev_model.contract.wire import KEPT
 from maglev_model.parameters import build, parameter, specs, values
-from maglev_model.phases import Phase
-from maglev_model.wire import KEPT
 from maglev_node.graph_guard import GraphGuard, Watchers
 from maglev_node.mode_check import StageCheck
 from maglev_node.node import MaglevNode, SourceParameters

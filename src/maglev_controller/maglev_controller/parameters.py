@@ -9,7 +9,6 @@ import dataclasses
 
 import numpy as np
 
-from maglev_controller.foreign_law import ForeignLawParameters
 from maglev_controller.learning_parameters import LearningParameters
 from maglev_controller.stage_parameters import (
     EncoderParameters,
@@ -19,6 +18,7 @@ from maglev_controller.stage_parameters import (
 )
 from maglev_controller.supervision_parameters import (
     FollowingParameters,
+    ForeignLawParameters,
     MeasurementParameters,
     OwnLandingParameters,
 )

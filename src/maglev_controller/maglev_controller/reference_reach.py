@@ -11,10 +11,10 @@ from typing import Annotated
 import numpy as np
 
 from maglev_controller.parameters import ControllerParameters
-from maglev_controller.sample_step import LARGEST_REFERENCE
+from maglev_controller.step.sample import LARGEST_REFERENCE
 from maglev_model.axes import AXES, UNITS, FloatArray
 from maglev_model.compiled import borrowing
-from maglev_model.records import Block, Record
+from maglev_model.compiled.records import Block, Record
 
 
 class ReachArrays(Record):

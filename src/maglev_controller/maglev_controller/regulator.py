@@ -19,7 +19,14 @@ from numpy.typing import ArrayLike
 
 from maglev_controller.bumpless_transfer import ModelMaps, carry_over, check_retuning, model_maps
 from maglev_controller.checks import check_foreign
-from maglev_controller.control_arrays import (
+from maglev_controller.design.axis_design import AxisDesign
+from maglev_controller.design.margins import LoopMargins, all_margins, check_margins
+from maglev_controller.design.observer import NO_OBSERVER
+from maglev_controller.foreign_law import ForeignLaw, Law
+from maglev_controller.laws import control_law, find_law
+from maglev_controller.parameters import ControllerParameters
+from maglev_controller.stage_parameters import EncoderParameters
+from maglev_controller.step.arrays import (
     AXIS,
     INVERSES,
     MODEL,
@@ -28,12 +35,8 @@ from maglev_controller.control_arrays import (
     SETTINGS,
     ControlArrays,
 )
-from maglev_controller.design.axis_design import AxisDesign
-from maglev_controller.design.margins import LoopMargins, all_margins, check_margins
-from maglev_controller.design.observer import NO_OBSERVER
-from maglev_controller.estimation import DOUBT
-from maglev_controller.foreign_law import ForeignLaw, Law
-from maglev_controller.foreign_sample import (
+from maglev_controller.step.estimation import DOUBT
+from maglev_controller.step.foreign_sample import (
     TOLD,
     close_by_itself,
     close_with_currents,
@@ -41,18 +44,15 @@ from maglev_controller.foreign_sample import (
     open_sample,
     warm_up,
 )
-from maglev_controller.laws import control_law, find_law
-from maglev_controller.parameters import ControllerParameters
-from maglev_controller.rest import FADING_TIME as REST_FADING_TIME
-from maglev_controller.sample_step import (
+from maglev_controller.step.rest import FADING_TIME as REST_FADING_TIME
+from maglev_controller.step.sample import (
     BAD_REFERENCE,
     FIRST_FAULT,
     NOT_FINITE,
     WARPED,
     answer_sample,
 )
-from maglev_controller.stage_parameters import EncoderParameters
-from maglev_controller.voltage import winding_settings
+from maglev_controller.step.voltage import winding_settings
 from maglev_model.axes import AXES, FloatArray
 from maglev_model.machine import machine_constants
 from maglev_model.machine_array import machine_to_array

@@ -14,9 +14,9 @@ from maglev_controller.reference_buffer import ReferenceBuffer
 from maglev_controller.reference_reach import ReferenceReach
 from maglev_controller.regulator import MeasurementFault, Regulator
 from maglev_model.axes import FloatArray
-from maglev_model.controller_watch import Status
-from maglev_model.modes import Mode
-from maglev_model.phases import Phase
+from maglev_model.contract.controller_watch import Status
+from maglev_model.contract.modes import Mode
+from maglev_model.contract.phases import Phase
 
 _CATCH_UP = 0.3  # time a landing has to bring back a platen that did not follow [s]
 _LATE = 0.02  # the rest before a lift-off that is followed is over by, at most [s]

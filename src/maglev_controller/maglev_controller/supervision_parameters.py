@@ -1,4 +1,4 @@
-"""The parameters of what the controller does when a reading or the platen goes astray."""
+"""What the controller does when a reading, the platen or a law of one's own goes astray."""
 
 from __future__ import annotations
 
@@ -56,4 +56,18 @@ class FollowingParameters:
         'time in which what a jump allows for fades to 37 %',
         unit='s',
         within=(0.01, 60.0),
+    )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class ForeignLawParameters:
+    """What a law that is an object of one's own may take."""
+
+    time: float = parameter(
+        5e-4, 'time it may take for a sample, wall clock', unit='s', within=(1e-6, 0.1)
+    )
+    late_samples: int = parameter(
+        10,
+        'realtime: it may take longer this often in a row; then the controller lands',
+        within=(0, 1000),
     )

@@ -16,7 +16,7 @@ from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_model.axes import FloatArray
 from maglev_model.commutation import phase_currents
 from maglev_model.compiled import borrowing, compiled
-from maglev_model.records import Block, Record
+from maglev_model.compiled.records import Block, Record
 
 # What drive() returns.
 FINE: Final = 0

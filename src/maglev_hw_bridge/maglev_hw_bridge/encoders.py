@@ -11,7 +11,7 @@ from maglev_hw_bridge.parameters import BEYOND_STOPS, BridgeParameters
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import borrowing
-from maglev_model.records import Block, Record
+from maglev_model.compiled.records import Block, Record
 
 CountArray = NDArray[np.int32]
 

@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from maglev_hw_bridge import amplifiers, guard
+from maglev_hw_bridge import amplifiers
 from maglev_hw_bridge.amplifiers import Amplifiers
-from maglev_hw_bridge.guard import Guard
 from maglev_hw_bridge.landing import impacts_of_cut
 from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.sensing import guard
+from maglev_hw_bridge.sensing.guard import Guard
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES, PHASE_NAMES
 from maglev_model.axes import AXES
-from maglev_model.stage import Fault
+from maglev_model.contract.stage import Fault
 
 FloatArray = NDArray[np.float64]
 

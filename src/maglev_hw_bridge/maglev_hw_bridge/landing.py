@@ -12,16 +12,16 @@ from typing import Annotated
 
 import numpy as np
 
-from maglev_hw_bridge.observer import Flags
 from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.sensing.observer import Flags
 from maglev_model.axes import THETA, FloatArray, X, Z
 from maglev_model.compiled import compiled
+from maglev_model.compiled.records import Block, Record
 from maglev_model.inverse import Answer, CurrentLimits, exact_inverse
 from maglev_model.machine import Machine, machine_constants
 from maglev_model.machine_array import MachineArray, machine_from_array
 from maglev_model.platen import output_accelerations
 from maglev_model.quintic import braking_times, quintic_to_zero
-from maglev_model.records import Block, Record
 
 _ACROSS = np.array([False, True, True, False, False])
 _PLACE, _REST = 2e-5, 2e-3  # so near x or z may be, and so slow, not to be pushed [m], [m/s]

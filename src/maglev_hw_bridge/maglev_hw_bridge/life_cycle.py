@@ -18,14 +18,14 @@ from maglev_hw_bridge import faults
 from maglev_hw_bridge.amplifiers import Amplifiers
 from maglev_hw_bridge.drivers import Driver, DriverError, WatchdogError, make_driver
 from maglev_hw_bridge.encoders import Encoders, HomingError
-from maglev_hw_bridge.guard import Guard
 from maglev_hw_bridge.lift import Lift
 from maglev_hw_bridge.memory import Memory
 from maglev_hw_bridge.mode import Mode
 from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.sensing.guard import Guard
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES
-from maglev_model.plugins import describe_error
-from maglev_model.stage import STOPPED_SINCE, EncoderSample, Fault, StageError
+from maglev_model.contract.stage import STOPPED_SINCE, EncoderSample, Fault, StageError
+from maglev_model.parameters.plugins import describe_error
 
 FloatArray = NDArray[np.float64]
 

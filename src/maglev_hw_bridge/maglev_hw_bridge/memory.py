@@ -23,8 +23,8 @@ import numpy as np
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.signal_parameters import PHASES
 from maglev_model.axes import FloatArray
+from maglev_model.contract.stage import Fault, StageError
 from maglev_model.parameters import ParameterError
-from maglev_model.stage import Fault, StageError
 
 _FULL = 1.0  # I²t load of a phase that nobody knows anything about
 _SEE = 'see to the machine and its amplifiers'

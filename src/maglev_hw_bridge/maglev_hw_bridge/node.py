@@ -12,8 +12,8 @@ from maglev_hw_bridge.doubts import doubts
 from maglev_hw_bridge.encoders import HomingError
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.stage import BridgeStage, Mode
+from maglev_model.contract.stage import StageError
 from maglev_model.parameters import parameter
-from maglev_model.stage import StageError
 from maglev_node.node import NodeError
 from maglev_node.stage_node import StageNode
 from maglev_node.stage_parameters import StageNodeParameters

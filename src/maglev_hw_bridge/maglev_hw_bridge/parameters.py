@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from maglev_hw_bridge.emulation_parameters import EmulationParameters
+from maglev_hw_bridge.emulation.parameters import EmulationParameters
 from maglev_hw_bridge.signal_parameters import (
     BoardParameters,
     CommutationParameters,

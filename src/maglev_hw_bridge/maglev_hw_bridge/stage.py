@@ -12,15 +12,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from maglev_hw_bridge import amplifiers, faults, guard
+from maglev_hw_bridge import amplifiers, faults
 from maglev_hw_bridge.drivers import Driver, DriverError, Truthful
-from maglev_hw_bridge.knock import Knock
 from maglev_hw_bridge.landing import Landing, impacts_of_cut
 from maglev_hw_bridge.life_cycle import StageLife
 from maglev_hw_bridge.mode import Mode as Mode
 from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.sensing import guard
+from maglev_hw_bridge.sensing.knock import Knock
 from maglev_model.axes import AXES
-from maglev_model.stage import EncoderSample, Fault, StageError, Truth, motor_currents
+from maglev_model.contract.stage import EncoderSample, Fault, StageError, Truth, motor_currents
 
 FloatArray = NDArray[np.float64]
 
@@ -35,7 +36,7 @@ _LEFT, _SOON = 3e-4, 0.02  # what rested and is, or soon will be, farther off ha
 
 
 class BridgeStage(StageLife):
-    """The :class:`~maglev_model.stage.Stage` on boards, one sample per :meth:`read`."""
+    """The :class:`~maglev_model.contract.stage.Stage` on boards, one sample per :meth:`read`."""
 
     paced = True
     restartable = True

@@ -14,10 +14,10 @@ import numpy as np
 
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import borrowing, compiled
+from maglev_model.compiled.records import Record
 from maglev_model.machine import Machine, MachineParameters
 from maglev_model.machine_array import MachineArray, machine_from_array, machine_to_array
 from maglev_model.motor import force_coefficients
-from maglev_model.records import Record
 
 ROWS: Final = 128
 TOLERANCE: Final = 1e-13

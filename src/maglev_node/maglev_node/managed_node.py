@@ -10,8 +10,8 @@ from typing import Any, TypeVar
 
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 
+from maglev_model.contract.stage import StageError
 from maglev_model.parameters import ParameterError, parameter
-from maglev_model.stage import StageError
 from maglev_node.node import MaglevNode, NodeError, SourceParameters
 
 

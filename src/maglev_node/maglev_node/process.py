@@ -19,9 +19,9 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
-from maglev_model import ahead
-from maglev_model.command import leave_with
+from maglev_model.compiled import ahead
 from maglev_model.parameters import ParameterError
+from maglev_model.programs.command import leave_with
 from maglev_node.dds import prepare_middleware
 from maglev_node.discovery import discovering
 from maglev_node.node import MaglevNode, NodeError, spin

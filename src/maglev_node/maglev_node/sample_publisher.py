@@ -7,9 +7,9 @@ from typing import Any, TypeVar
 
 from rosgraph_msgs.msg import Clock
 
-from maglev_model.controller_watch import NOBODY
-from maglev_model.stage import EncoderSample, Truth
-from maglev_model.wire import KEPT
+from maglev_model.contract.controller_watch import NOBODY
+from maglev_model.contract.stage import EncoderSample, Truth
+from maglev_model.contract.wire import KEPT
 from maglev_node.graph_guard import Watchers
 from maglev_node.node import MaglevNode, SourceParameters
 from maglev_node.samples import ProgressWriter, SampleWriter

@@ -10,7 +10,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
-from maglev_model.wire import DecodeError, Incoming, Outgoing
+from maglev_model.contract.wire import DecodeError, Incoming, Outgoing
 from maglev_node.polling import PollingNode
 from maglev_node.topics import KEYS, PROGRESS_PERIOD, SAMPLE_TOPICS, sample_qos, sampled
 

@@ -6,8 +6,8 @@ import time
 from itertools import count
 from typing import Any, Generic, TypeVar
 
-from maglev_model.controller_watch import NOBODY, ControllerWatch, Verdict
-from maglev_model.stage import EncoderSample, Fault, Stage, StageError
+from maglev_model.contract.controller_watch import NOBODY, ControllerWatch, Verdict
+from maglev_model.contract.stage import EncoderSample, Fault, Stage, StageError
 from maglev_node.managed_node import ManagedNode
 from maglev_node.pacing import Deadlines, Pace, StageClock
 from maglev_node.sample_publisher import SamplePublisher
@@ -30,8 +30,8 @@ class Sampling(Generic[P, S]):
     Lockstep: the first sample is repeated until a controller answers it; from then on each sample
     waits for the currents with its sequence number. Real time: a sample every sample time, with the
     newest currents, hence one sample of delay. Whose currents are followed, and from when on, is
-    for the :class:`~maglev_model.controller_watch.ControllerWatch` to say; what it refuses in
-    flight is a fault of the stage.
+    for the :class:`~maglev_model.contract.controller_watch.ControllerWatch` to say; what it refuses
+    in flight is a fault of the stage.
     """
 
     def __init__(self, node: ManagedNode[P], stage: S) -> None:

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import Trigger
 
-from maglev_model.stage import Stage
+from maglev_model.contract.stage import Stage
 from maglev_node.graph_guard import GraphGuard
 from maglev_node.managed_node import ManagedNode
 from maglev_node.node import NodeError
@@ -21,7 +21,7 @@ S = TypeVar('S', bound=Stage)
 
 
 class StageNode(ManagedNode[P], Generic[P, S]):
-    """Publishes the encoders of a :class:`~maglev_model.stage.Stage` and gives it the currents.
+    """Publishes the encoders of a :class:`~maglev_model.contract.stage.Stage`, gives it currents.
 
     Configured, it holds its stage and its place on the graph; active, it samples; deactivated or
     told to end in flight, it lands first. A fault of the stage is latched until ``~/reset``. How

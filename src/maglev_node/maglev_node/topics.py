@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from maglev_model.wire import KEPT, KEY_OF_MESSAGE_TYPE, PROGRESS_SUFFIX
+from maglev_model.contract.wire import KEPT, KEY_OF_MESSAGE_TYPE, PROGRESS_SUFFIX
 from maglev_msgs.msg import ControllerState, Currents, Measurement, PlantState, Reference
 
 MEASUREMENT = 'stage/measurement'
@@ -33,7 +33,7 @@ KEYS = {
     topic: KEY_OF_MESSAGE_TYPE[f'maglev_msgs/msg/{message_type.__name__}']
     for topic, message_type in SAMPLE_TOPICS.items()
 }
-"""Their keys in :data:`maglev_model.wire.TOPIC_TYPES`."""
+"""Their keys in :data:`maglev_model.contract.wire.TOPIC_TYPES`."""
 
 PROGRESS = {STAGE_PROGRESS: MEASUREMENT, CONTROLLER_PROGRESS: CONTROLLER_STATE}
 """The topics for whoever need not hear of every sample, with those they are taken from."""

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from contextlib import suppress
 from typing import Any, TypeVar
 
+from maglev_model.contract.wire import DecodeError, Incoming
 from maglev_model.parameters import parameter
-from maglev_model.wire import DecodeError, Incoming
 from maglev_node import realtime
 from maglev_node.node import MaglevNode, NodeParameters
 from maglev_node.topics import KEYS, MEASUREMENT

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maglev_model.axes import FloatArray
+from maglev_model.compiled.records import Record
 from maglev_model.machine import Machine, machine_constants
 from maglev_model.machine_array import MachineArray
-from maglev_model.records import Record
 from maglev_plant.effects.arrays import EffectArrays, effect_arrays
 from maglev_plant.parameters import PlantParameters
 

@@ -6,12 +6,12 @@ import math
 
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import borrowing
+from maglev_model.compiled.records import Block
 from maglev_model.force_table import tabulated_coefficients
 from maglev_model.machine import Machine
 from maglev_model.machine_array import machine_from_array
 from maglev_model.motor import forces_of_currents
 from maglev_model.platen import balance, motor_gaps
-from maglev_model.records import Block
 from maglev_plant.amplifier import set_targets
 from maglev_plant.arrays import StageArrays
 from maglev_plant.rough import advance_rough

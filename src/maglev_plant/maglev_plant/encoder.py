@@ -10,10 +10,10 @@ import math
 import numpy as np
 
 from maglev_model.compiled import borrowing, compiled
+from maglev_model.compiled.records import Block
 from maglev_model.machine import Machine
 from maglev_model.machine_array import machine_from_array
 from maglev_model.platen import motor_gaps
-from maglev_model.records import Block
 from maglev_plant.arrays import StageArrays
 from maglev_plant.effects.modes import add_deflections
 from maglev_plant.effects.sensor import count_lengths, late_by, note_own, read_lengths

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import borrowing
-from maglev_model.records import Block
-from maglev_model.stage import STOPPED_SINCE, EncoderSample, Fault, Truth, motor_currents
+from maglev_model.compiled.records import Block
+from maglev_model.contract.stage import STOPPED_SINCE, EncoderSample, Fault, Truth, motor_currents
 from maglev_plant.arrays import StageArrays, stage_arrays
 from maglev_plant.dynamics import advance
 from maglev_plant.encoder import encode
@@ -50,7 +50,7 @@ def _hold(i_d: FloatArray, i_q: FloatArray, command: FloatArray) -> bool:
 
 
 class SimulatedStage:
-    """The :class:`~maglev_model.stage.Stage` in simulation, one sample per :meth:`read`.
+    """The :class:`~maglev_model.contract.stage.Stage` in simulation, one sample per :meth:`read`.
 
     The first ``read`` gives sample 0 at the initial state. Each further one carries the plant over
     one sample time with the currents last written held, and gives what the encoders read then.

@@ -19,10 +19,10 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from maglev_model.arguments import positive, whole_number
 from maglev_model.axes import AXES
-from maglev_model.command import leave_with
 from maglev_model.parameters import ParameterError, from_yaml, replace
+from maglev_model.programs.arguments import positive, whole_number
+from maglev_model.programs.command import leave_with
 from maglev_reference.accuracy import compliance, disturbance_lines
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.trajectories import course

@@ -8,7 +8,7 @@ import numpy as np
 
 from maglev_model.axes import FloatArray
 from maglev_model.parameters import ParameterError
-from maglev_model.plugins import describe_error
+from maglev_model.parameters.plugins import describe_error
 from maglev_model.quintic import evaluate_quintic, quintic_coefficients
 
 

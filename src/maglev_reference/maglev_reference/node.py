@@ -14,12 +14,12 @@ from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
 from maglev_model.axes import FloatArray
-from maglev_model.controller_watch import NOBODY
+from maglev_model.contract.controller_watch import NOBODY
+from maglev_model.contract.modes import Mode
+from maglev_model.contract.phases import Phase
+from maglev_model.contract.wire import KEPT
 from maglev_model.geometry import outputs_of_gaps
-from maglev_model.modes import Mode
 from maglev_model.parameters import parameter
-from maglev_model.phases import Phase
-from maglev_model.wire import KEPT
 from maglev_msgs.srv import Step
 from maglev_node.graph_guard import GraphGuard, Watchers
 from maglev_node.mode_check import StageCheck

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from maglev_model.axes import FloatArray
-from maglev_model.modes import Mode
-from maglev_model.phases import Phase
+from maglev_model.contract.modes import Mode
+from maglev_model.contract.phases import Phase
 from maglev_reference.check import UnreachableError
 from maglev_reference.given_points import Candidate, Point, Through, step
 from maglev_reference.parameters import ReferenceParameters

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from maglev_model.axes import PHI, FloatArray, Y
-from maglev_model.phases import Phase
+from maglev_model.contract.phases import Phase
 from maglev_model.quintic import coasted, minimum_jerk_time
 from maglev_reference.check import utilisation, within
 from maglev_reference.currents import current_utilisation

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from maglev_model.axes import FloatArray, Y
-from maglev_model.phases import Phase
+from maglev_model.contract.phases import Phase
 from maglev_reference.check import UnreachableError, check_locked, check_rest, check_samples
 from maglev_reference.currents import check_currents
 from maglev_reference.motion import Kinematics, Motion, State, state_at

@@ -9,7 +9,7 @@ import numpy as np
 
 from maglev_model.axes import AXES, UNITS, FloatArray
 from maglev_model.parameters import ParameterError
-from maglev_model.plugins import plugin_function
+from maglev_model.parameters.plugins import plugin_function
 from maglev_model.quintic import minimum_jerk_time
 from maglev_reference.check import UnreachableError
 from maglev_reference.curves import Chirp, Helix, Sinusoids, Square

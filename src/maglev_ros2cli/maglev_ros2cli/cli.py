@@ -13,7 +13,7 @@ from typing import NoReturn
 
 import argcomplete
 
-from maglev_model.command import unwritten
+from maglev_model.programs.command import unwritten
 from maglev_ros2cli.errors import CommandError
 from maglev_ros2cli.parser import SUBSET, Parser
 

@@ -15,7 +15,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.topic_or_service_is_hidden import topic_or_service_is_hidden
 from rclpy.validate_full_topic_name import validate_full_topic_name
 
-from maglev_model.arguments import not_negative
+from maglev_model.programs.arguments import not_negative
 from maglev_node.dds import local_participants, only_here, prepare_middleware
 from maglev_node.polling import PollingNode
 from maglev_ros2cli.errors import CommandError

@@ -16,7 +16,7 @@ from rclpy.qos import (
     ReliabilityPolicy,
 )
 
-from maglev_model.arguments import count, not_negative
+from maglev_model.programs.arguments import count, not_negative
 from maglev_ros2cli.parser import Parser
 
 _POLICIES: dict[str, Any] = {

@@ -8,16 +8,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from maglev_controller.control_arrays import ControlArrays, Currents, Reading, Reference
 from maglev_controller.learning import IterativeLearning
-from maglev_controller.learning_step import NO_LEARNING, LearningArrays, learn, look_ahead
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import MeasurementFault, Regulator
-from maglev_controller.sample_step import FIRST_FAULT, control_step
+from maglev_controller.step.arrays import ControlArrays, Currents, Reading, Reference
+from maglev_controller.step.learning import NO_LEARNING, LearningArrays, learn, look_ahead
+from maglev_controller.step.sample import FIRST_FAULT, control_step
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import borrowing
+from maglev_model.compiled.records import Block
 from maglev_model.geometry import outputs_of_gaps
-from maglev_model.records import Block
 from maglev_plant.arrays import StageArrays
 from maglev_plant.dynamics import advance
 from maglev_plant.encoder import encode

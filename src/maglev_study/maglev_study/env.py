@@ -12,19 +12,19 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from maglev_controller.foreign_sample import (
+from maglev_controller.parameters import ControllerParameters
+from maglev_controller.regulator import Regulator
+from maglev_controller.step.foreign_sample import (
     TOLD,
     close_with_currents,
     close_with_input,
     open_sample,
 )
-from maglev_controller.parameters import ControllerParameters
-from maglev_controller.regulator import Regulator
-from maglev_controller.sample_step import FIRST_FAULT
+from maglev_controller.step.sample import FIRST_FAULT
 from maglev_model.axes import FloatArray
 from maglev_model.inverse import CurrentLimits
-from maglev_model.optional import needed
 from maglev_model.parameters import ParameterError, replace
+from maglev_model.programs.optional import needed
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
 from maglev_study.arguments import a_table

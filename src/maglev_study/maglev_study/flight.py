@@ -20,8 +20,8 @@ from maglev_controller.learning import IterativeLearning, iterative_learning
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
 from maglev_model.axes import AXES, FloatArray
+from maglev_model.contract.phases import Phase
 from maglev_model.parameters import ParameterError, from_yaml, replace
-from maglev_model.phases import Phase
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
 from maglev_reference.parameters import ReferenceParameters
@@ -51,9 +51,9 @@ _NAMED = {'ellipse': ELLIPSE, 'ellipse_4dof': ELLIPSE_4DOF}
 class FlightRecord:
     """What happened in the n samples of a flight; row k is sample k.
 
-    ``time`` (n,) [s]; ``phase`` (n,) of :class:`maglev_model.phases.Phase`; ``reference`` what was
-    to be followed, (n, 5) each; ``run`` the true states and the currents; ``learning`` what was
-    learned, where ``learning.period`` of the controller asks for it.
+    ``time`` (n,) [s]; ``phase`` (n,) of :class:`maglev_model.contract.phases.Phase`; ``reference``
+    what was to be followed, (n, 5) each; ``run`` the true states and the currents; ``learning``
+    what was learned, where ``learning.period`` of the controller asks for it.
     """
 
     time: FloatArray

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from maglev_controller.control_arrays import EXACT, INVERSES, SIMPLIFIED
 from maglev_controller.parameters import ControllerParameters
+from maglev_controller.step.arrays import EXACT, INVERSES, SIMPLIFIED
 from maglev_model.axes import FloatArray
 from maglev_model.equilibrium import equilibrium_inverse
 from maglev_model.inverse import Answer, CurrentLimits, exact_inverse, simplified_inverse

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import MeasurementFault
 from maglev_model.axes import AXES
+from maglev_model.contract.stage import EncoderSample
 from maglev_model.parameters import ParameterError, specs, unknown_parameter
-from maglev_model.stage import EncoderSample
 from maglev_plant import simulation
 from maglev_plant.parameters import PlantParameters
 from maglev_reference.parameters import ReferenceParameters

@@ -19,14 +19,14 @@ from maglev_controller.laws import ControlLaw, control_law
 from maglev_controller.parameters import ControllerParameters
 from maglev_model.axes import AXES, FloatArray
 from maglev_model.compiled import compiled
+from maglev_model.compiled.records import Block
 from maglev_model.currents import exact_currents
 from maglev_model.inverse import NO_LIMITS
 from maglev_model.machine import Machine
 from maglev_model.machine_array import machine_from_array
-from maglev_model.optional import needed
 from maglev_model.parameters import ParameterError
 from maglev_model.platen import output_accelerations
-from maglev_model.records import Block
+from maglev_model.programs.optional import needed
 from maglev_plant.arrays import StageArrays, stage_arrays, true_machine
 from maglev_plant.dynamics import derivative
 from maglev_plant.parameters import PlantParameters

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
 from maglev_model.axes import AXES
-from maglev_model.command import leave_with
 from maglev_model.paper import SCENARIOS, STEPS, TRACKING, WINDOW, PublishedStep
+from maglev_model.programs.command import leave_with
 from maglev_monitor.bag.analysis import Analysis, analyse
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.metrics.readable import angle_or_length, micro, seconds

@@ -10,8 +10,8 @@ from typing import NoReturn
 
 import numpy as np
 
-from maglev_model.command import leave_with
 from maglev_model.machine import Machine, MachineParameters, machine_constants
+from maglev_model.programs.command import leave_with
 from maglev_study.terms import (
     POWERS,
     FloatArray,

@@ -17,8 +17,8 @@ from typing import NoReturn
 import numpy as np
 
 from maglev_model.axes import FloatArray
-from maglev_model.command import leave_with
-from maglev_model.progress import Progress
+from maglev_model.programs.command import leave_with
+from maglev_model.programs.progress import Progress
 from maglev_monitor.bag.analysis import Analysis, analyse
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.reader import run_folder

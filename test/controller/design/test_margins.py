@@ -14,10 +14,10 @@ from scipy.optimize import brentq
 from maglev_controller.design.axis_design import controller_system, resting
 from maglev_controller.design.margins import check_margins, loop_margins
 from maglev_controller.design.state_space import Mode, closed_loop, plant_system, response
-from maglev_controller.estimation import DOUBT
 from maglev_controller.laws.output_regulator import design as design_axis
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
+from maglev_controller.step.estimation import DOUBT
 from maglev_model.axes import AXES
 from maglev_model.parameters import ParameterError, build, read_yaml, replace
 

@@ -16,7 +16,7 @@ from maglev_controller.design.margins import loop_margins
 from maglev_controller.laws import control_law, find_law, law_names
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
-from maglev_controller.voltage import USED
+from maglev_controller.step.voltage import USED
 from maglev_model.axes import AXES
 from maglev_model.equilibrium import equilibrium_current, equilibrium_inverse, stiffness
 from maglev_model.inverse import Answer, CurrentLimits

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from made_up_run import TOPICS, Encoder, make_run, open_bag, write_samples
 
-from maglev_model.phases import Phase
+from maglev_model.contract.phases import Phase
 from maglev_monitor.bag.compare import compare
 from maglev_monitor.bag.compare_cli import DIFFERENT, EQUAL, UNREADABLE, compare_bags
 from maglev_monitor.bag.reader import Bag

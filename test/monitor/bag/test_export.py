@@ -18,8 +18,8 @@ from scipy.io import loadmat
 
 import maglev_monitor
 from maglev_model.axes import AXES
-from maglev_model.optional import MissingLibraryError
-from maglev_model.progress import Progress
+from maglev_model.programs.optional import MissingLibraryError
+from maglev_model.programs.progress import Progress
 from maglev_monitor.bag.analysis import analyse
 from maglev_monitor.bag.columns import COLUMNS, FIRST, NONE, Table, table
 from maglev_monitor.bag.errors import BagError

@@ -14,7 +14,7 @@ from mcap.reader import make_reader
 from mcap.writer import MCAP0_MAGIC
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
-from maglev_model.progress import Progress
+from maglev_model.programs.progress import Progress
 from maglev_monitor.bag.analysis import analyse
 from maglev_monitor.bag.columns import table
 from maglev_monitor.bag.errors import BagError
@@ -268,8 +268,8 @@ def test_the_bar_of_what_is_read_ends(
     bag: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(sys.stdout, 'isatty', lambda: True)
-    monkeypatch.setattr('maglev_model.progress._AFTER', 0.0)
-    monkeypatch.setattr('maglev_model.progress._REDRAWN', 0.0)
+    monkeypatch.setattr('maglev_model.programs.progress._AFTER', 0.0)
+    monkeypatch.setattr('maglev_model.programs.progress._REDRAWN', 0.0)
     for _ in Bag(bag, Progress('read', '%', lines=False)).batches():
         pass
     bars = capsys.readouterr().out.split('\r\033[K')

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from maglev_model.contract.phases import Phase
+from maglev_model.contract.wire import DecodeError
 from maglev_model.parameters import build
-from maglev_model.phases import Phase
-from maglev_model.wire import DecodeError
 from maglev_monitor.live.discovery import DiscoveryWatch
 from maglev_monitor.live.run_watch import RunWatch, WatchParameters
 

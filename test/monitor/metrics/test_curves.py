@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from maglev_model.phases import Phase
+from maglev_model.contract.phases import Phase
 from maglev_monitor.metrics.curves import COLUMNS, RunCurves
 from maglev_monitor.metrics.decoding import decode
 from maglev_monitor.metrics.envelope import Envelope

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_up_run import Encoder
 
-from maglev_model.phases import Phase
-from maglev_model.wire import KEY_OF_MESSAGE_TYPE, TOPIC_TYPES, DecodeError
+from maglev_model.contract.phases import Phase
+from maglev_model.contract.wire import KEY_OF_MESSAGE_TYPE, TOPIC_TYPES, DecodeError
 from maglev_monitor.metrics.decoding import decode, stamps
 from maglev_monitor.metrics.derived import positions
 from maglev_monitor.metrics.joiner import ROW

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from run_figures import RUN, figures
 
-from maglev_model.phases import Phase
+from maglev_model.contract.phases import Phase
 from maglev_monitor.metrics.decoding import Records
 from maglev_monitor.metrics.joiner import Joiner
 from maglev_monitor.metrics.run_metrics import RunMetrics

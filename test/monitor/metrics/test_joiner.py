@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from maglev_model.phases import Phase
-from maglev_model.wire import KEPT, TOPIC_TYPES
+from maglev_model.contract.phases import Phase
+from maglev_model.contract.wire import KEPT, TOPIC_TYPES
 from maglev_monitor.metrics.decoding import Records, decode
 from maglev_monitor.metrics.joiner import Joiner
 

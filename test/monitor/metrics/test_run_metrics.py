@@ -12,9 +12,9 @@ from made_up_run import OWN, TOPICS, Encoder, make_run
 from run_figures import RUN, figures
 
 from maglev_model.axes import AXES
-from maglev_model.modes import Mode
+from maglev_model.contract.modes import Mode
+from maglev_model.contract.phases import Phase
 from maglev_model.parameters import build
-from maglev_model.phases import Phase
 from maglev_monitor.metrics.decoding import Records, decode
 from maglev_monitor.metrics.derived import phase_currents
 from maglev_monitor.metrics.joiner import ROW, Joiner

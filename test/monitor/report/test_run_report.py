@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from made_up_run import TOPICS, Encoder, open_bag, write_samples
 
-from maglev_model.phases import Phase
+from maglev_model.contract.phases import Phase
 from maglev_monitor.bag.analysis import analyse
 from maglev_monitor.report import run_report
 

@@ -14,8 +14,8 @@ from maglev_hw_bridge import faults
 from maglev_hw_bridge.amplifiers import Amplifiers
 from maglev_hw_bridge.board import Board
 from maglev_hw_bridge.drivers.quanser import QuanserDriver
-from maglev_hw_bridge.guard import Guard
 from maglev_hw_bridge.landing import Landing
+from maglev_hw_bridge.sensing.guard import Guard
 from maglev_hw_bridge.stage import BridgeStage
 from maglev_study.faults.flight import Flight
 from maglev_study.faults.fly import expected_of

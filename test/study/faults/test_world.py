@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from maglev_hw_bridge.emulated_card import HILError
+from maglev_hw_bridge.emulation.card import HILError
 from maglev_study.faults.flight import Flight
 from maglev_study.faults.hardware_faults import INTERRUPTED
 from maglev_study.faults.machines import machine

@@ -20,9 +20,9 @@ import pytest
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_model.axes import AXES
-from maglev_model.optional import MissingLibraryError
 from maglev_model.parameters import ParameterError, from_yaml
-from maglev_model.progress import Progress
+from maglev_model.programs.optional import MissingLibraryError
+from maglev_model.programs.progress import Progress
 from maglev_plant.parameters import PlantParameters
 from maglev_study.robustness import fleet, guarantee
 from maglev_study.robustness.draw import NOMINAL
@@ -379,6 +379,6 @@ def test_ctrl_c_leaves_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr('maglev_model.progress.Progress.tell', interrupted)
+    monkeypatch.setattr('maglev_model.programs.progress.Progress.tell', interrupted)
     assert main(['--params', str(PARAMS), '--jobs', '1', '--out', str(tmp_path)]) == INTERRUPTED
     assert 'incomplete' in (tmp_path / 'robustness.html').read_text(encoding='utf-8')

@@ -25,8 +25,8 @@ from maglev_controller.design.state_space import (
     response,
     series,
 )
-from maglev_controller.estimation import DOUBT
 from maglev_controller.parameters import ControllerParameters, MarginParameters
+from maglev_controller.step.estimation import DOUBT
 from maglev_model.axes import AXES, FloatArray
 from maglev_model.parameters import ParameterError
 

@@ -33,7 +33,7 @@ from maglev_controller.checks import check_currents, check_foreign, check_learni
 from maglev_controller.design.axis_design import AxisDesign
 from maglev_controller.foreign_law import Law
 from maglev_controller.parameters import ControllerParameters
-from maglev_model.plugins import find_plugin, names_in, plugin_function
+from maglev_model.parameters.plugins import find_plugin, names_in, plugin_function
 
 _LANDS = 'output_regulator'
 

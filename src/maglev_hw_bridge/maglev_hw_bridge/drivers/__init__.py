@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_model.parameters import ParameterError
-from maglev_model.plugins import plugin_function
+from maglev_model.parameters.plugins import plugin_function
 
 CountArray = NDArray[np.int32]
 VoltArray = NDArray[np.float64]

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maglev_hw_bridge.drivers.quanser import QuanserDriver
-from maglev_hw_bridge.emulated_card import Clock, Code, DigitalState, EmulatedCard, HILError
-from maglev_hw_bridge.emulated_lines import Lines
+from maglev_hw_bridge.emulation.card import Clock, Code, DigitalState, EmulatedCard, HILError
+from maglev_hw_bridge.emulation.lines import Lines
+from maglev_hw_bridge.emulation.rig import Rig
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_hw_bridge.rig import Rig
 from maglev_hw_bridge.signal_parameters import CHANNELS
 from maglev_model.axes import FloatArray
 

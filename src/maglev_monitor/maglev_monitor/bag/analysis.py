@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from maglev_model.contract.phases import Phase
 from maglev_model.parameters import DIFFERS, ParameterError
-from maglev_model.phases import Phase
-from maglev_model.progress import Progress
+from maglev_model.programs.progress import Progress
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.reader import Bag, run_folder
 from maglev_monitor.metrics.curves import RunCurves

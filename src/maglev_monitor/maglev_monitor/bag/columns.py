@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from maglev_model.axes import AXES, UNITS
 from maglev_model.geometry import outputs_of_gaps
-from maglev_model.progress import Progress
+from maglev_model.programs.progress import Progress
 from maglev_monitor.bag.analysis import run_parameters
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.reader import Bag

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from maglev_model.phases import Phase
-from maglev_model.wire import TOPIC_TYPES
+from maglev_model.contract.phases import Phase
+from maglev_model.contract.wire import TOPIC_TYPES
 from maglev_monitor.bag.reader import Bag, Batch
 from maglev_monitor.metrics.decoding import Records
 

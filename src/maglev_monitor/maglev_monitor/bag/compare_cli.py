@@ -8,10 +8,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from maglev_model.arguments import not_negative
-from maglev_model.command import leave_with
-from maglev_model.progress import Progress
-from maglev_model.wire import TOPIC_TYPES
+from maglev_model.contract.wire import TOPIC_TYPES
+from maglev_model.programs.arguments import not_negative
+from maglev_model.programs.command import leave_with
+from maglev_model.programs.progress import Progress
 from maglev_monitor.bag.compare import TopicComparison, compare
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.reader import Bag

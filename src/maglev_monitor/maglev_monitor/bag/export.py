@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from maglev_model.optional import needed
-from maglev_model.progress import Progress
+from maglev_model.programs.optional import needed
+from maglev_model.programs.progress import Progress
 from maglev_monitor.bag.columns import Table, table
 
 _ROWS = 10_000  # of text that is made at once
@@ -23,7 +23,7 @@ def read(path: str | Path) -> Any:
 
     One row a sample; ``attrs`` holds ``units`` and ``descriptions`` by column, and ``notes`` on the
     bag. Raises :class:`~.errors.BagError` for what is no bag of a run, and
-    :class:`~maglev_model.optional.MissingLibraryError` without pandas.
+    :class:`~maglev_model.programs.optional.MissingLibraryError` without pandas.
     """
     with needed('pandas', 'read'):
         import pandas

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from maglev_model.command import leave_with
-from maglev_model.optional import MissingLibraryError
-from maglev_model.progress import Progress
+from maglev_model.programs.command import leave_with
+from maglev_model.programs.optional import MissingLibraryError
+from maglev_model.programs.progress import Progress
 from maglev_monitor.bag.columns import table
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.export import FORMATS, write

@@ -6,7 +6,7 @@ import struct
 from bisect import bisect_right
 from collections.abc import Sequence
 
-from maglev_model.wire import KEY_OF_MESSAGE_TYPE
+from maglev_model.contract.wire import KEY_OF_MESSAGE_TYPE
 from maglev_monitor.metrics.decoding import decode
 
 _STAMP = struct.Struct('<iI')  # of the header, behind the encapsulation

@@ -16,8 +16,8 @@ from rosbags.rosbag2 import Reader
 from rosbags.serde.errors import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
-from maglev_model.progress import Progress
-from maglev_model.wire import KEY_OF_MESSAGE_TYPE, PROGRESS_SUFFIX
+from maglev_model.contract.wire import KEY_OF_MESSAGE_TYPE, PROGRESS_SUFFIX
+from maglev_model.programs.progress import Progress
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.mcap_file import MAGIC_BYTES, McapFile, TopicMessages
 from maglev_monitor.metrics.decoding import Records, decode

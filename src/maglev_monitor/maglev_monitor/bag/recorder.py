@@ -22,7 +22,7 @@ from rosbags.interfaces import (
 )
 
 from maglev_model.parameters import parameter
-from maglev_model.revision import revision
+from maglev_model.programs.revision import revision
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.log_time import LogTimes
 from maglev_monitor.bag.writer import BagWriter

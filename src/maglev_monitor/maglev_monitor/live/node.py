@@ -10,8 +10,8 @@ from typing import Any, ClassVar
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
+from maglev_model.contract.wire import DecodeError
 from maglev_model.parameters import parameter
-from maglev_model.wire import DecodeError
 from maglev_monitor.live.discovery import DiscoveryWatch
 from maglev_monitor.live.run_watch import RunWatch, WatchParameters
 from maglev_monitor.metrics.result_file import write_metrics

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from maglev_model.axes import AXES
-from maglev_model.phases import phase_name
+from maglev_model.contract.phases import phase_name
 from maglev_monitor.metrics.decoding import Records
 from maglev_monitor.metrics.derived import positions
 from maglev_monitor.metrics.run_parameters import RunParameters

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from maglev_model.contract.wire import DecodeError
 from maglev_model.parameters import parameter
-from maglev_model.wire import DecodeError
 from maglev_monitor.live.discovery import DiscoveryWatch
 from maglev_monitor.live.progress import Progress
 from maglev_monitor.live.silence import SilenceWatch

@@ -1,8 +1,8 @@
 """The five topics of a run as columns: serialized messages in, NumPy records out.
 
 A block of serialized messages of one topic is decoded at once, without building a message object
-for each: the fields lie where :mod:`maglev_model.wire` says, so a block is one structured array. A
-live monitor and the analysis of a bag both read through here. No ROS here.
+for each: the fields lie where :mod:`maglev_model.contract.wire` says, so a block is one structured
+array. A live monitor and the analysis of a bag both read through here. No ROS here.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from maglev_model.wire import TOPIC_TYPES, DecodeError, no_record_type, record_type
+from maglev_model.contract.wire import TOPIC_TYPES, DecodeError, no_record_type, record_type
 
 Records = NDArray[np.void]
 

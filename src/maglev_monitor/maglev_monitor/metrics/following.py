@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from maglev_model.modes import Mode
-from maglev_model.phases import phase_name
+from maglev_model.contract.modes import Mode
+from maglev_model.contract.phases import phase_name
 from maglev_monitor.metrics.decoding import Records
 
 _BY_ITSELF = (Mode.LANDING, Mode.FAULT)

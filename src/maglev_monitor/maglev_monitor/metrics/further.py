@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maglev_model.parameters import ParameterError
-from maglev_model.plugins import describe_error, plugin_function
+from maglev_model.parameters.plugins import describe_error, plugin_function
 from maglev_monitor.metrics.decoding import Records
 from maglev_monitor.metrics.run_parameters import RunParameters
 

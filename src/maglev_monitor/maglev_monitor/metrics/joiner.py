@@ -10,8 +10,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from maglev_model.phases import Phase
-from maglev_model.wire import KEPT, TOPIC_TYPES
+from maglev_model.contract.phases import Phase
+from maglev_model.contract.wire import KEPT, TOPIC_TYPES
 from maglev_monitor.metrics.decoding import Records, stamps
 
 _COLUMNS: dict[str, tuple[tuple[str, str], ...]] = {

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maglev_model.axes import AXES
-from maglev_model.phases import Phase
-from maglev_model.wire import TOPIC_TYPES
+from maglev_model.contract.phases import Phase
+from maglev_model.contract.wire import TOPIC_TYPES
 from maglev_monitor.metrics.arrivals import Arrivals
 from maglev_monitor.metrics.decoding import Records
 from maglev_monitor.metrics.derived import SOURCES, phase_currents, positions

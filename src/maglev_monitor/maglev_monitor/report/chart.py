@@ -23,7 +23,7 @@ from bokeh.resources import Resources
 from bokeh.transform import dodge
 from numpy.typing import NDArray
 
-from maglev_model.phases import Phase
+from maglev_model.contract.phases import Phase
 from maglev_monitor.metrics.curves import COLUMNS
 from maglev_monitor.metrics.envelope import Envelope
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maglev_model.axes import AXES
-from maglev_model.phases import Phase
+from maglev_model.contract.phases import Phase
 from maglev_monitor.bag.analysis import Analysis
 from maglev_monitor.metrics.curves import COLUMNS, StepCurves
 from maglev_monitor.report.chart import (

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from maglev_model.compiled.records import Record
 from maglev_model.machine import Machine
-from maglev_model.records import Record
 from maglev_plant.effects.balance import BalanceArrays, balance_arrays
 from maglev_plant.effects.drive import DriveArrays, drive_arrays
 from maglev_plant.effects.floor import FloorArrays, floor_arrays

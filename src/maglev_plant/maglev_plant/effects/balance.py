@@ -14,9 +14,9 @@ import numpy as np
 
 from maglev_model.axes import PHI, THETA, FloatArray, X, Y, Z
 from maglev_model.compiled import borrowing
+from maglev_model.compiled.records import Record
 from maglev_model.machine import Machine
 from maglev_model.parameters import ParameterError
-from maglev_model.records import Record
 
 if TYPE_CHECKING:
     from maglev_plant.parameters import PlantParameters

@@ -14,7 +14,7 @@ import numpy as np
 
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import borrowing
-from maglev_model.records import Record
+from maglev_model.compiled.records import Record
 from maglev_plant.random_numbers import drawn
 
 if TYPE_CHECKING:

@@ -26,7 +26,7 @@ import numpy as np
 
 from maglev_model.compiled import intrinsic, numba
 from maglev_model.parameters import ParameterError
-from maglev_model.plugins import find_plugin
+from maglev_model.parameters.plugins import find_plugin
 
 _MEMORY = 4
 _kept: list[Any] = []

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from maglev_model.axes import PHI, THETA, FloatArray, X, Z
 from maglev_model.compiled import borrowing, compiled
-from maglev_model.records import Record
+from maglev_model.compiled.records import Record
 from maglev_plant.effects.foreign import call_friction, friction_address
 from maglev_plant.effects.parameters import FRICTIONS
 

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Final
 
 from maglev_model.compiled import borrowing
-from maglev_model.records import Record
+from maglev_model.compiled.records import Record
 
 if TYPE_CHECKING:
     from maglev_plant.parameters import PlantParameters

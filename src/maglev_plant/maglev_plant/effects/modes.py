@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from maglev_model.axes import AXES, FloatArray
 from maglev_model.compiled import borrowing
-from maglev_model.records import Record
+from maglev_model.compiled.records import Record
 
 if TYPE_CHECKING:
     from maglev_plant.parameters import PlantParameters

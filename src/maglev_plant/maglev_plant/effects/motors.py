@@ -18,10 +18,10 @@ import numpy as np
 
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import borrowing
+from maglev_model.compiled.records import Record
 from maglev_model.force_table import ForceTable, force_table, tabulated_coefficients
 from maglev_model.machine import Machine
 from maglev_model.motor import forces_of_currents
-from maglev_model.records import Record
 from maglev_plant.effects.foreign import call_motor, motor_address
 from maglev_plant.random_numbers import drawn
 

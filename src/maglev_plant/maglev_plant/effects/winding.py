@@ -27,10 +27,10 @@ import numpy as np
 from maglev_model.axes import FloatArray
 from maglev_model.commutation import direct_quadrature_currents, phase_currents
 from maglev_model.compiled import borrowing, compiled
+from maglev_model.compiled.records import Record
 from maglev_model.machine import Machine
 from maglev_model.motor import force_coefficients
 from maglev_model.parameters import ParameterError
-from maglev_model.records import Record
 from maglev_plant.effects.motors import MotorArrays, along_across, motor_coefficients, motor_gap
 
 if TYPE_CHECKING:

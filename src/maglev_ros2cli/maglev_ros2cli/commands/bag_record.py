@@ -14,7 +14,7 @@ from typing import Any
 from rclpy.qos import HistoryPolicy, QoSProfile
 from rclpy.topic_or_service_is_hidden import topic_or_service_is_hidden
 
-from maglev_model.command import noted
+from maglev_model.programs.command import noted
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.recorder import bag_qos, message_folder
 from maglev_monitor.bag.writer import BagWriter

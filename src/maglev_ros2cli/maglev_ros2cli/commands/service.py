@@ -6,7 +6,7 @@ import sys
 import time
 from typing import Any
 
-from maglev_model.arguments import positive
+from maglev_model.programs.arguments import positive
 from maglev_ros2cli.graph import (
     absolute,
     add_arguments,

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from maglev_model.arguments import count, not_negative
+from maglev_model.programs.arguments import count, not_negative
 from maglev_node.polling import PollingNode
 from maglev_ros2cli import qos
 from maglev_ros2cli.errors import CommandError

@@ -7,7 +7,7 @@ import statistics
 import time
 from typing import Any
 
-from maglev_model.arguments import whole_number
+from maglev_model.programs.arguments import whole_number
 from maglev_ros2cli import qos
 from maglev_ros2cli.commands.topic_echo import the_type
 from maglev_ros2cli.graph import absolute, add_arguments, add_topic_name, graph, topics, wait_until

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from maglev_model.arguments import count, not_negative, positive
+from maglev_model.programs.arguments import count, not_negative, positive
 from maglev_ros2cli import qos
 from maglev_ros2cli.errors import CommandError
 from maglev_ros2cli.graph import absolute, add_arguments, add_topic_name, node

@@ -14,11 +14,11 @@ from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
 from maglev_controller.laws import control_law, find_law
-from maglev_model.arguments import positive
 from maglev_model.axes import THETA, X, Y
-from maglev_model.command import leave_with
 from maglev_model.parameters import ParameterError, replace
-from maglev_model.progress import Progress, add_output_options, talking
+from maglev_model.programs.arguments import positive
+from maglev_model.programs.command import leave_with
+from maglev_model.programs.progress import Progress, add_output_options, talking
 from maglev_study.closed_loop import warm_up
 from maglev_study.comparison.contestants import Contestant, find_contestants
 from maglev_study.comparison.experiments import Row, loops, steps, tracking

@@ -10,7 +10,7 @@ from itertools import groupby
 from multiprocessing.synchronize import Event
 from typing import NamedTuple, TypeVar
 
-from maglev_model.command import noted
+from maglev_model.programs.command import noted
 from maglev_study.faults.fly import Scenario
 from maglev_study.faults.judge import Verdict
 from maglev_study.faults.shrink import shrink

@@ -20,9 +20,9 @@ from maglev_hw_bridge.encoders import HomingError
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.stage import BridgeStage
 from maglev_model.axes import FloatArray
-from maglev_model.controller_watch import ControllerWatch, Verdict
+from maglev_model.contract.controller_watch import ControllerWatch, Verdict
+from maglev_model.contract.stage import EncoderSample, Fault, StageError
 from maglev_model.parameters import build
-from maglev_model.stage import EncoderSample, Fault, StageError
 from maglev_study.faults.programme import RESET, STOP, Programme
 from maglev_study.faults.world import World
 

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from maglev_model.controller_watch import Status
-from maglev_model.modes import Mode
+from maglev_model.contract.controller_watch import Status
+from maglev_model.contract.modes import Mode
 from maglev_study.faults.catalogue import KINDS
 from maglev_study.faults.flight import Answer, Bridge, Flight
 from maglev_study.faults.hardware_faults import blame_of

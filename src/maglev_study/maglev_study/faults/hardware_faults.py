@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from maglev_hw_bridge.emulated_card import HILError
+from maglev_hw_bridge.emulation.card import HILError
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES
 from maglev_study.faults.kinds import CUT, DEGRADED, NOMINAL, Expected, Fault, Kind, Run
 from maglev_study.faults.programme import PHASES

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from maglev_hw_bridge.rig import Rig
+from maglev_hw_bridge.emulation.rig import Rig
 from maglev_model.axes import FloatArray
 from maglev_study.faults.flight import Flight
 from maglev_study.faults.hardware_faults import SHOWS

@@ -15,8 +15,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from maglev_model.arguments import whole_number
-from maglev_model.progress import Progress, add_output_options, talking
+from maglev_model.programs.arguments import whole_number
+from maglev_model.programs.progress import Progress, add_output_options, talking
 from maglev_study.faults.campaign import Campaign, Outcome
 from maglev_study.faults.draw import cells, from_json, scenario
 from maglev_study.faults.fly import Scenario

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from maglev_model.controller_watch import Status
+from maglev_model.contract.controller_watch import Status
 from maglev_study.faults.flight import Answer, Bridge
 from maglev_study.faults.kinds import CUT, NOMINAL, NOTHING, Begin, Expected, Fault, Kind, Run
 from maglev_study.faults.programme import BEFORE_THE_FIRST_SAMPLE, PHASES

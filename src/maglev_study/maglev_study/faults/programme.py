@@ -7,8 +7,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from maglev_model.contract.phases import Phase
 from maglev_model.loop_parameters import REFERENCE_FREQUENCY
-from maglev_model.phases import Phase
 from maglev_model.quintic import minimum_jerk
 from maglev_study.references import HOVER, References, ellipse_at, held, joined, shaped
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maglev_hw_bridge.drivers.emulated import EmulatedBoards
-from maglev_hw_bridge.emulated_card import EmulatedCard
+from maglev_hw_bridge.emulation.card import EmulatedCard
 from maglev_hw_bridge.parameters import BridgeParameters
 
 CALLS = (

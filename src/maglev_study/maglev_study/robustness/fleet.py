@@ -11,8 +11,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from maglev_model.compiled.sources import sources_digest
 from maglev_model.parameters import ParameterError, values
-from maglev_model.sources import sources_digest
 from maglev_study.comparison.contestants import Contestant, find_contestants
 from maglev_study.robustness.draw import NOMINAL, Draw, Machine, check_draws, machine, read_draws
 from maglev_study.robustness.experiments import Experiment, chosen, experiments
@@ -119,8 +119,8 @@ def campaign(
 
     Raises ParameterError for what is wrong in the files, was flown otherwise in ``out``, or is of
     other code on a worker of the cluster; OSError where ``out`` cannot be written or the scheduler
-    not be reached, and :class:`~maglev_model.optional.MissingLibraryError` for a scheduler without
-    Dask.
+    not be reached, and :class:`~maglev_model.programs.optional.MissingLibraryError` for a scheduler
+    without Dask.
     """
     plan = make_plan(params, machines, laws=laws, names=names, overlays=overlays, seed=seed)
     return fly_plan(plan, out, jobs=jobs, scheduler=scheduler)

@@ -16,10 +16,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from maglev_model.arguments import whole_number
-from maglev_model.optional import MissingLibraryError
 from maglev_model.parameters import ParameterError
-from maglev_model.progress import Progress, add_output_options, talking
+from maglev_model.programs.arguments import whole_number
+from maglev_model.programs.optional import MissingLibraryError
+from maglev_model.programs.progress import Progress, add_output_options, talking
 
 if TYPE_CHECKING:
     from maglev_study.robustness.fleet import Campaign, Plan

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maglev_model.axes import AXES, UNITS
-from maglev_model.optional import MissingLibraryError
+from maglev_model.programs.optional import MissingLibraryError
 from maglev_monitor.bag.columns import Table
 from maglev_monitor.bag.export import write
 from maglev_study.robustness.fleet import Campaign

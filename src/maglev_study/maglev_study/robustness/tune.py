@@ -12,9 +12,9 @@ import numpy as np
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
 from maglev_model.axes import AXES, FloatArray
-from maglev_model.optional import needed
+from maglev_model.compiled.sources import sources_digest
 from maglev_model.parameters import ParameterError, replace
-from maglev_model.sources import sources_digest
+from maglev_model.programs.optional import needed
 from maglev_study.comparison.contestants import Contestant
 from maglev_study.robustness.draw import NOMINAL
 from maglev_study.robustness.fleet import Plan, fly_machine
@@ -198,7 +198,7 @@ def tune(
 
     Raises ParameterError for a law without such numbers and a margin that none have,
     KeyboardInterrupt for Ctrl-C before the first trial is done, and
-    :class:`~maglev_model.optional.MissingLibraryError` without Optuna.
+    :class:`~maglev_model.programs.optional.MissingLibraryError` without Optuna.
     """
     (contestant,) = plan.contestants
     check_tunable(contestant)

@@ -11,8 +11,8 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from maglev_model.arguments import not_negative, whole_number
-from maglev_model.progress import Progress
+from maglev_model.programs.arguments import not_negative, whole_number
+from maglev_model.programs.progress import Progress
 from maglev_study.robustness.main import DONE, INTERRUPTED, command, command_parser, plan_of
 
 if TYPE_CHECKING:

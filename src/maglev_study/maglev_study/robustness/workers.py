@@ -11,8 +11,8 @@ from typing import Any, TypeVar
 
 import joblib
 
-from maglev_model.optional import MissingLibraryError, needed
 from maglev_model.parameters import ParameterError
+from maglev_model.programs.optional import MissingLibraryError, needed
 from maglev_study.closed_loop import warm_up
 
 T = TypeVar('T')
@@ -37,8 +37,8 @@ def results(
 
     Raises what the function raises, OSError where the scheduler cannot be reached or gives up,
     ParameterError for an address that is none and jobs out of bounds, and
-    :class:`~maglev_model.optional.MissingLibraryError` for a scheduler without Dask, and for
-    workers without these packages.
+    :class:`~maglev_model.programs.optional.MissingLibraryError` for a scheduler without Dask, and
+    for workers without these packages.
     """
     if not isinstance(jobs, Integral) or not 1 <= jobs <= MOST_JOBS:
         raise ParameterError(f"'jobs' is {jobs!r}, it must be a whole number from 1 to {MOST_JOBS}")

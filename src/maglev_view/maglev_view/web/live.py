@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from maglev_model.axes import AXES, FloatArray
+from maglev_model.contract.modes import Mode
+from maglev_model.contract.phases import phase_name
 from maglev_model.geometry import outputs_of_gaps
-from maglev_model.modes import Mode
-from maglev_model.phases import phase_name
 from maglev_monitor.metrics.decoding import Records
 from maglev_view.frames import Vector, platen_pose
 from maglev_view.parameters import WebParameters

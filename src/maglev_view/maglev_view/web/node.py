@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from maglev_model.wire import DecodeError
+from maglev_model.contract.wire import DecodeError
 from maglev_monitor.metrics.decoding import decode
 from maglev_node.node import MaglevNode, NodeError, NodeParameters
 from maglev_node.topics import (

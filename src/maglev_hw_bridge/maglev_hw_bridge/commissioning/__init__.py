@@ -1,0 +1,1 @@
+"""A machine brought up step by step, each proven before the next."""

@@ -1,0 +1,1 @@
+"""Boards that are none, and the machine behind them."""

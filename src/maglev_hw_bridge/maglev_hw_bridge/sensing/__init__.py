@@ -1,0 +1,1 @@
+"""Which encoders can be believed, and where the platen is."""

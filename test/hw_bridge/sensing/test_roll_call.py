@@ -1,0 +1,76 @@
+"""At lift-off the gap encoders are called by roll."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hovering import PARAMETERS, hovering
+
+from maglev_hw_bridge.sensing.guard_arrays import LOST, PUT_RIGHT, SOUND
+from maglev_hw_bridge.sensing.standing_still import (
+    await_lift_off,
+    call_the_roll,
+)
+from maglev_model.axes import PHI, THETA, X, Y, Z
+
+STOP = PARAMETERS.machine.gap_max
+
+
+@pytest.mark.parametrize(('y', 'answered'), [(0.025, 1), (STOP - 1e-4, 0)])
+def test_on_the_ground_the_roll_waits_for_who_has_left_the_stop(y: float, answered: int) -> None:
+    for way in (await_lift_off, lambda g: call_the_roll(g, False, np.ones(6, bool))):
+        watched = hovering()
+        watched.position[Y] = y
+        watched.answered[:], watched.left[:] = 7, 1.0
+        assert not way(watched.block[0])
+        assert watched.answered.tolist() == [answered] * 4
+        assert not watched.left.any()
+
+
+@pytest.mark.parametrize('caller', range(4))
+@pytest.mark.parametrize('way', [-1.0, 1.0])
+def test_who_has_not_counted_when_another_has_left_is_done_without(caller: int, way: float) -> None:
+    """The roll is called when one that is sound has gone 35 um, in steps less than that."""
+    watched = hovering()
+    watched.answered[:] = 0
+    watched.disturbance[:] = 9.0
+    quiet = (caller + 1) % 4
+    gone = [1.7e-5, 1.7e-5, 0.9e-5]  # 34 um, then 43
+    for number, step in enumerate(gone):
+        counted = np.array([i != quiet for i in range(6)])
+        watched.past[0] = watched.believed
+        watched.believed[caller] += way * step
+        found = call_the_roll(watched.block[0], True, counted)
+        assert found is (number == 2)
+    assert watched.trust.tolist() == [LOST if i == quiet else SOUND for i in range(6)]
+    assert watched.blamed.tolist() == [int(i == quiet) for i in range(6)]
+    assert watched.disturbance[[PHI, THETA]].tolist() == [0.0, 0.0]
+    assert watched.disturbance[[Y, X, Z]].tolist() == [9.0] * 3
+    watched.blamed[:] = 0
+    assert not call_the_roll(watched.block[0], True, np.zeros(6, bool))  # it is lost already
+    assert not watched.blamed.any()
+
+
+@pytest.mark.parametrize('why', ['all answered', 'it leapt', 'put right'])
+def test_nobody_is_missed_without_a_reason(why: str) -> None:
+    watched = hovering()
+    watched.answered[:] = 1 if why == 'all answered' else [1, 0, 1, 1]
+    watched.left[0] = 3.4e-5
+    watched.trust[0] = PUT_RIGHT if why == 'put right' else SOUND
+    watched.believed[0] += 3.6e-5 if why == 'it leapt' else 1e-5
+    assert not call_the_roll(watched.block[0], True, np.arange(6) == 0)
+    assert watched.trust[1] == SOUND
+    assert watched.left[0] == pytest.approx(0.0 if why == 'it leapt' else 4.4e-5)
+
+
+def test_a_bound_that_is_just_reached_is_not_yet_passed() -> None:
+    """35 um: of a step that is a leap, and of the way that calls the roll."""
+    watched = hovering()
+    watched.answered[:] = 0
+    watched.past[0, 0], watched.believed[0], watched.left[0] = 0.0, 3.5e-5, 1e-6
+    assert not call_the_roll(watched.block[0], True, np.arange(6) == 0)
+    assert watched.left[0] == 0.0
+    watched.past[0, 0], watched.left[0] = watched.believed[0], PARAMETERS.fault.roll_call
+    assert not call_the_roll(watched.block[0], True, np.arange(6) == 0)
+    watched.left[0] = np.nextafter(watched.left[0], 1.0)
+    assert call_the_roll(watched.block[0], True, np.arange(6) == 0)
