@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 from collections.abc import Mapping
 from typing import Any
@@ -45,12 +46,9 @@ def scenario(seed: int, *, double: bool = False) -> Scenario:
         other = KINDS[table[int(rng.integers(len(table)))][0]]
         if phase in other.phases and other.name != 'none':
             second = other.draw(rng)
-            faults.append(_later(second, int(rng.integers(0, _LATEST + 1))))
+            later = int(rng.integers(0, _LATEST + 1))
+            faults.append(dataclasses.replace(second, delay=later))
     return Scenario(seed // PER_MACHINE, phase, instant, tuple(faults), seed)
-
-
-def _later(fault: Fault, delay: int) -> Fault:
-    return Fault(fault.kind, fault.targets, fault.size, fault.call, delay)
 
 
 def to_json(run: Scenario) -> dict[str, Any]:

@@ -27,7 +27,7 @@ _DISPENSABLE = 2
 """Gap encoders that the model can stand in for."""
 
 SIZES = {'stuck': (0, 0), 'slip': (1, 50), 'jump': (51, 5000), 'noise': (5, 100), 'reset': (0, 0)}
-WHICH = {'a gap': 'gap', 'x or z': 'across', 'several': 'several'}
+WHICH = ('a gap', 'x or z', 'several')
 
 
 def blame_of(failed: Sequence[int]) -> str:
@@ -37,17 +37,19 @@ def blame_of(failed: Sequence[int]) -> str:
 
 
 def encoders(name: str, which: str) -> Kind:
+    row = f'{name}: {which}'
+
     def draw(rng: np.random.Generator) -> Fault:
-        if which == 'gap':
+        if which == 'a gap':
             targets = [int(rng.integers(4))]
-        elif which == 'across':
+        elif which == 'x or z':
             targets = [int(rng.integers(4, 6))]
         else:
             bits = int(rng.choice([b for b in range(64) if bin(b).count('1') > 1]))
             targets = [i for i in range(6) if bits >> i & 1]
         low, high = SIZES[name]
         size = float(rng.integers(low, high + 1) * (rng.choice((-1, 1)) if low else 1))
-        return Fault(_row(name, which), tuple(targets), size)
+        return Fault(row, tuple(targets), size)
 
     def begin(run: Run, fault: Fault) -> None:
         world, targets = run.flight.world, list(fault.targets)
@@ -71,13 +73,9 @@ def encoders(name: str, which: str) -> Kind:
             CUT if hopeless else DEGRADED, 10, blame, stuck=stuck, encoders=fault.targets
         )
 
-    lost_unseen = name in ('slip', 'jump', 'reset') and which != 'gap'
+    lost_unseen = name in ('slip', 'jump', 'reset') and which != 'a gap'
     phases = tuple(phase for phase in PHASES if not (lost_unseen and phase == 'arming'))
-    return Kind(_row(name, which), draw, begin, expected, phases)
-
-
-def _row(name: str, which: str) -> str:
-    return f'{name}: {next(text for text, short in WHICH.items() if short == which)}'
+    return Kind(row, draw, begin, expected, phases)
 
 
 # -- the vendor's calls ----------------------------------------------------------------------------

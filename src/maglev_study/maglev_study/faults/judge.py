@@ -117,13 +117,11 @@ class Judge:
 
     def end(self) -> None:
         """A terminal state is reached."""
-        if self.ended is None:
-            self.ended = self._n
+        self.ended = self._n
 
     def release(self) -> None:
         """The process ends."""
-        if self.released is None:
-            self.released = self._n
+        self.released = self._n
 
     def blame(self, rule: int, text: str) -> None:
         """A rule is broken."""
@@ -214,16 +212,13 @@ class Judge:
         return np.stack([y - r * phi, y + r * theta, y + r * phi, y - r * theta, x, z], axis=1)
 
     def _judge_detection(self, expected: Expected, first: int | None) -> None:
-        if first is not None:
-            first = max(first, self.latched)
-        seen = self._end if self.seen is None else self.seen
-        wanted = first is not None and expected.seen is not None
-        if wanted and expected.aloft and not self._aloft(first or 0):
-            wanted = False
-        late = wanted and seen > (first or 0) + (expected.seen or 0)
-        if late and first is not None:
+        if first is None or expected.seen is None:
+            return
+        first = max(first, self.latched)
+        after = (self._end if self.seen is None else self.seen) - first
+        if after > expected.seen and (self._aloft(first) or not expected.aloft):
             what = 'never found out' if self.seen is None else 'found out late'
-            self.blame(1, f'{what}: {seen - first} samples after it showed')
+            self.blame(1, f'{what}: {after} samples after it showed')
 
     def _judge_course(self) -> None:
         """What is not found out must not carry the platen away."""

@@ -43,7 +43,7 @@ class Expected(NamedTuple):
     encoders: tuple[int, ...] = ()  # those that fail, of which ``blame`` may name any
 
 
-Begin = Callable[['Run', Fault], None]
+Begin = Callable[['Run', Fault], object]
 
 
 class Run(NamedTuple):

@@ -119,12 +119,12 @@ def _tell(tally: Tally, shrunk: Sequence[tuple[Outcome, Outcome]], path: Path) -
 
 
 def _replay(run: Scenario, out: Path) -> tuple[int, dict[str, Any]]:
-    from maglev_study.faults.replay import replay
-    from maglev_study.faults.replay import write as write_replay
+    from maglev_monitor.metrics.result_file import write_whole
+    from maglev_study.faults.replay import draw, replay
 
     record = replay(run)
     path = out / f'run-{run.seed}.html'
-    write_replay(record, path)
+    write_whole(path, draw(record))
     verdict = record.verdict
     print(describe(run))
     for name, at in record.marks.items():

@@ -101,11 +101,11 @@ def _cells(tally: Tally) -> str:
     heads = ['fault', 'all phases', 'median found', *PHASES]
     rows = []
     for kind in tally.kinds:
-        median = tally.median_detection(kind)
+        row = tally.row(kind)
         cells = [
             f'<td>{html.escape(kind)}</td>',
-            _cell(tally.row(kind)),
-            f'<td>{"–" if median is None else f"{1e3 * median:.0f} ms"}</td>',
+            _cell(row),
+            f'<td>{"–" if row.median is None else f"{1e3 * row.median:.0f} ms"}</td>',
             *(_cell(tally.cell(kind, phase)) for phase in PHASES),
         ]
         rows.append(f'<tr>{"".join(cells)}</tr>')

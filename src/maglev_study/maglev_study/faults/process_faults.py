@@ -17,43 +17,43 @@ SAMPLING = tuple(phase for phase in PHASES if phase not in BEFORE_THE_FIRST_SAMP
 _BLAME_CURRENTS = r'currents|i_d|command|controller|carry|old|age'
 
 
-def controller(name: str, low: int, high: int, seen: int | None) -> Kind:
-    def draw(rng: np.random.Generator) -> Fault:
-        return Fault(f'controller: {name}', (), float(rng.integers(low, high + 1)))
-
+def controller(
+    name: str,
+    act: Begin,
+    sizes: tuple[int, int] = (0, 0),
+    seen: int | None = None,
+    *,
+    shows: bool = True,
+) -> Kind:
     def begin(run: Run, fault: Fault) -> None:
-        _CONTROLLERS[name](run, fault)
-        if name not in ('slow', 'stalled'):
+        act(run, fault)
+        if shows:
             run.shows.append(run.flight.samples + 1)
 
     return Kind(
         f'controller: {name}',
-        draw,
+        lambda rng: Fault(f'controller: {name}', (), float(rng.integers(sizes[0], sizes[1] + 1))),
         begin,
         lambda fault: Expected(NOMINAL, seen, _BLAME_CURRENTS, aloft=True),
         SAMPLING,
     )
 
 
-def _die(run: Run, fault: Fault) -> None:
+def die(run: Run, _: Fault) -> None:
     run.flight.controller.alive = False
 
 
-def _except(run: Run, fault: Fault) -> None:
-    run.flight.controller.defect()
-
-
-def _give_up(run: Run, fault: Fault) -> None:
+def give_up(run: Run, _: Fault) -> None:
     run.flight.inbox = run.flight.controller.last_words()
 
 
-def _zeros(run: Run, fault: Fault) -> None:
+def zeros(run: Run, _: Fault) -> None:
     run.flight.controller.twist = lambda answer: [
         answer._replace(direct=np.zeros(4), quadrature=np.zeros(4))
     ]
 
 
-def _nan(run: Run, fault: Fault) -> None:
+def nan(run: Run, fault: Fault) -> None:
     def twist(answer: Answer) -> list[Answer]:
         direct = answer.direct.copy()
         direct[int(fault.size) % 4] = np.nan
@@ -62,11 +62,11 @@ def _nan(run: Run, fault: Fault) -> None:
     run.flight.controller.twist = twist
 
 
-def _slow(run: Run, fault: Fault) -> None:
+def slow(run: Run, fault: Fault) -> None:
     run.flight.controller.pace = 1.0 / (1.0 + fault.size / 100.0)
 
 
-def _stall(run: Run, fault: Fault) -> None:
+def stall(run: Run, fault: Fault) -> None:
     controller, end = run.flight.controller, run.flight.samples + int(fault.size)
     controller.stalled = True
 
@@ -77,7 +77,7 @@ def _stall(run: Run, fault: Fault) -> None:
     run.flight.each = each
 
 
-def _replay(run: Run, fault: Fault) -> None:
+def replay(run: Run, fault: Fault) -> None:
     """What was said up to a while ago is said over and over, with the numbers it had."""
     heard: list[Answer] = []
 
@@ -88,7 +88,7 @@ def _replay(run: Run, fault: Fault) -> None:
     run.flight.controller.twist = twist
 
 
-def _foreign(run: Run, fault: Fault) -> None:
+def foreign(run: Run, _: Fault) -> None:
     """Somebody else publishes as well, with numbers and currents of its own."""
     number = int(run.rng.integers(0, 2**31))
     session = int(run.rng.integers(1, 2**31))
@@ -102,18 +102,6 @@ def _foreign(run: Run, fault: Fault) -> None:
     run.flight.controller.twist = twist
 
 
-_CONTROLLERS: dict[str, Begin] = {
-    'killed': _die,
-    'exception': _except,
-    'gives up': _give_up,
-    'zeros': _zeros,
-    'NaN': _nan,
-    'slow': _slow,
-    'stalled': _stall,
-    'replayed': _replay,
-    'foreign': _foreign,
-}
-
 # -- the bridge's process, and its operator --------------------------------------------------------
 
 
@@ -123,7 +111,6 @@ def operator(
     impact: float | None = NOMINAL,
     blame: str = NOTHING,
     phases: tuple[str, ...] = PHASES,
-    sizes: tuple[int, int] = (0, 0),
     seen: int | None = None,
 ) -> Kind:
     def begin(run: Run, fault: Fault) -> None:
@@ -132,36 +119,26 @@ def operator(
         act(run, fault)
 
     return Kind(
-        name,
-        lambda rng: Fault(name, (), float(rng.integers(sizes[0], sizes[1] + 1))),
-        begin,
-        lambda fault: Expected(impact, seen, blame),
-        phases,
+        name, lambda rng: Fault(name), begin, lambda fault: Expected(impact, seen, blame), phases
     )
 
 
 def stopped() -> Kind:
-    def begin(run: Run, fault: Fault) -> None:
-        run.flight.world.delay(int(fault.size))
-
-    def expected(fault: Fault) -> Expected:
-        return Expected(NOMINAL if fault.size < 18 else CUT, None, 'late|watchdog')
-
     return Kind(
         'bridge stopped',
         lambda rng: Fault('bridge stopped', (), float(rng.integers(1, 51))),
-        begin,
-        expected,
+        lambda run, fault: run.flight.world.delay(int(fault.size)),
+        lambda fault: Expected(NOMINAL if fault.size < 18 else CUT, None, 'late|watchdog'),
         SAMPLING,
     )
 
 
-def press(run: Run, fault: Fault) -> None:
+def press(run: Run, _: Fault) -> None:
     run.flight.world.stop_pressed = True
     run.flight.forbidden = 'with the stop pressed'
 
 
-def skip_homing(run: Run, fault: Fault) -> None:
+def skip_homing(run: Run, _: Fault) -> None:
     run.flight.skip_homing = True
     run.flight.forbidden = 'without homing'
 
@@ -169,12 +146,12 @@ def skip_homing(run: Run, fault: Fault) -> None:
 _HOT = 100.0  # I2t load that does not cool while the test machine takes its time
 
 
-def heat(run: Run, fault: Fault) -> None:
+def heat(run: Run, _: Fault) -> None:
     run.flight.bridge.stage.amplifiers.arrays.load[:] = _HOT
     run.flight.forbidden = 'hot'
 
 
-def second(run: Run, fault: Fault) -> None:
+def second(run: Run, _: Fault) -> None:
     if not run.flight.world.cards:
         return  # the first has not opened them yet
     other = Bridge(run.flight.parameters, run.flight.world)
@@ -182,12 +159,3 @@ def second(run: Run, fault: Fault) -> None:
         other.stray = 'a second bridge had the boards of the first'
         run.flight.bridge.stray = other.stray
     other.die()
-
-
-def leave(run: Run, fault: Fault) -> None:
-    """Deactivate and clean up, as the life cycle wants it."""
-    run.flight.bridge.deactivate()
-
-
-def void(_value: object) -> None:
-    """Nothing is made of it."""

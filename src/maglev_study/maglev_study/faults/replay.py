@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -67,13 +66,6 @@ def draw(record: Record) -> str:
     return page(title, parts)
 
 
-def write(record: Record, path: Path) -> None:
-    """Write the page. Raises OSError when that cannot be."""
-    from maglev_monitor.metrics.result_file import write_whole
-
-    write_whole(path, draw(record))
-
-
 def _plot(record: Record):  # type: ignore[no-untyped-def]
     from matplotlib import pyplot as plt
 
@@ -81,8 +73,8 @@ def _plot(record: Record):  # type: ignore[no-untyped-def]
 
     time = np.arange(len(record.state), dtype=float)
     with plt.rc_context(STYLE):
-        figure, panels = plt.subplots(5, 1, figsize=(9.0, 11.0), sharex=True)
-        state, rows = 1e3 * record.state, panels
+        figure, rows = plt.subplots(5, 1, figsize=(9.0, 11.0), sharex=True)
+        state = 1e3 * record.state
         rows[0].plot(time, state[:, 0])
         rows[0].set(title='true air gap y', ylabel='mm')
         rows[1].plot(time, state[:, 2:5:2], label=('x', 'z'))

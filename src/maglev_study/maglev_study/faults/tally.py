@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
@@ -19,9 +19,8 @@ class Cell(NamedTuple):
     runs: int
     impact: float  # greatest [m/s]
     detection: float | None  # greatest [s]
-    found: int  # runs whose fault was latched
+    median: float | None  # of the times of detection [s]
     cut: int  # runs in which the current was cut in flight
-    blamed_wrong: int
     violations: int  # runs that broke a rule
 
 
@@ -33,9 +32,8 @@ def count(outcomes: Iterable[Outcome]) -> Cell:
         runs=len(verdicts),
         impact=max((verdict.impact for verdict in verdicts), default=0.0),
         detection=max(times, default=None),
-        found=sum(bool(verdict.reason) for verdict in verdicts),
+        median=float(np.median(times)) if times else None,
         cut=sum(verdict.ended == 'cut' for verdict in verdicts),
-        blamed_wrong=sum(any(rule == 5 for rule, _ in one.violations) for one in verdicts),
         violations=sum(bool(verdict.violations) for verdict in verdicts),
     )
 
@@ -46,14 +44,13 @@ class Tally:
     def __init__(self, outcomes: Sequence[Outcome]) -> None:
         self.outcomes = outcomes
         self.failures = [outcome for outcome in outcomes if outcome.verdict.violations]
-        cells: dict[tuple[str, str], list[Outcome]] = defaultdict(list)
+        self._cells: dict[tuple[str, str], list[Outcome]] = defaultdict(list)
         self._calls: dict[tuple[str, str], list[Outcome]] = defaultdict(list)
         for outcome in outcomes:
             fault = outcome.run.faults[0]
-            cells[fault.kind, outcome.run.phase].append(outcome)
+            self._cells[fault.kind, outcome.run.phase].append(outcome)
             if fault.call:
                 self._calls[fault.kind, fault.call].append(outcome)
-        self._cells = cells
 
     @property
     def kinds(self) -> list[str]:
@@ -86,10 +83,11 @@ class Tally:
 
     def by_rule(self) -> dict[int, int]:
         """Runs that broke each rule."""
-        broken: dict[int, int] = defaultdict(int)
-        for outcome in self.failures:
-            for rule in {rule for rule, _ in outcome.verdict.violations}:
-                broken[rule] += 1
+        broken = Counter(
+            rule
+            for outcome in self.failures
+            for rule in {rule for rule, _ in outcome.verdict.violations}
+        )
         return dict(sorted(broken.items()))
 
     def examples(self) -> list[Outcome]:
@@ -100,13 +98,3 @@ class Tally:
                 (outcome.run.faults[0].kind, outcome.verdict.violations[0][0]), outcome
             )
         return list(found.values())
-
-    def median_detection(self, kind: str) -> float | None:
-        """Median time of detection of a kind [s]."""
-        times = [
-            one.verdict.detection
-            for phase in PHASES
-            for one in self._cells.get((kind, phase), ())
-            if one.verdict.detection is not None
-        ]
-        return float(np.median(times)) if times else None

@@ -13,6 +13,7 @@ import pickle
 import select
 import signal
 import time
+import traceback
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TypeVar
@@ -130,11 +131,8 @@ def _attempt(work: Callable[[], T]) -> T | Verdict:
     try:
         return work()
     except Exception as error:
-        last = error.__traceback__
-        while last is not None and last.tb_next is not None:
-            last = last.tb_next
-        where = f'{last.tb_frame.f_code.co_filename}:{last.tb_lineno}' if last else ''
-        return _broken(f'{error!r} at {where}')
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        return _broken(f'{error!r} at {last.filename}:{last.lineno}')
 
 
 def _broken(what: str) -> Verdict:
