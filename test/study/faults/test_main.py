@@ -12,8 +12,9 @@ from pathlib import Path
 
 import pytest
 
+from maglev_study.command import INTERRUPTED, WRONG_USE
 from maglev_study.faults.draw import from_json, scenario, to_json
-from maglev_study.faults.main import BROKEN, INTERRUPTED, PASS, WRONG_USE, main
+from maglev_study.faults.main import BROKEN, PASS, main
 
 
 @pytest.mark.parametrize(

@@ -24,12 +24,13 @@ from maglev_model.parameters import ParameterError, from_yaml
 from maglev_model.programs.optional import MissingLibraryError
 from maglev_model.programs.progress import Progress
 from maglev_plant.parameters import PlantParameters
+from maglev_study.command import DONE, INTERRUPTED, WRONG_USE
 from maglev_study.robustness import fleet, guarantee
 from maglev_study.robustness.draw import NOMINAL
 from maglev_study.robustness.experiments import experiments
 from maglev_study.robustness.fleet import JOURNAL, Campaign, Plan, fly_plan, make_plan
 from maglev_study.robustness.fly import FLOWN, LOST, Flown, fly
-from maglev_study.robustness.main import DONE, INTERRUPTED, WRONG_USE, main
+from maglev_study.robustness.main import main
 from maglev_study.robustness.outcome import Group, groups, influence, worst
 from maglev_study.robustness.page import render, survivors
 from maglev_study.robustness.table import write_table

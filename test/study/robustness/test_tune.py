@@ -12,12 +12,12 @@ import pytest
 from maglev_controller.parameters import ControllerParameters
 from maglev_model.axes import AXES
 from maglev_model.parameters import ParameterError, from_yaml, replace
+from maglev_study.command import DONE, INTERRUPTED, WRONG_USE
 from maglev_study.comparison.contestants import Contestant
 from maglev_study.robustness import tune as module
 from maglev_study.robustness.fleet import make_plan
 from maglev_study.robustness.fly import FLOWN, Flown
 from maglev_study.robustness.fly import LOST as LOST_FLIGHT
-from maglev_study.robustness.main import DONE, INTERRUPTED, WRONG_USE
 from maglev_study.robustness.tune import (
     LOST,
     Course,

@@ -15,11 +15,12 @@ from typing import Any, NamedTuple, NoReturn
 
 from maglev_controller.laws import control_law, find_law
 from maglev_model.axes import THETA, X, Y
-from maglev_model.parameters import ParameterError, replace
+from maglev_model.parameters import replace
 from maglev_model.programs.arguments import positive
 from maglev_model.programs.command import leave_with
-from maglev_model.programs.progress import Progress, add_output_options, talking
+from maglev_model.programs.progress import Progress, add_output_options
 from maglev_study.closed_loop import warm_up
+from maglev_study.command import DONE, INTERRUPTED, command, writable
 from maglev_study.comparison.contestants import Contestant, find_contestants
 from maglev_study.comparison.experiments import Row, loops, steps, tracking
 from maglev_study.comparison.region import Region, region
@@ -42,22 +43,12 @@ def main() -> NoReturn:
 
 def compare(arguments: Sequence[str] | None = None) -> int:
     """Run the command and return its exit code."""
-    options = _parser().parse_args(arguments)
-    with talking(options):
-        code, outcome = _compared(options)
-    if options.json:
-        print(json.dumps({'passed': code == 0, **outcome}))
-    return code
+    return command('compare', _parser().parse_args(arguments), _compared)
 
 
 def _compared(options: argparse.Namespace) -> tuple[int, dict[str, Any]]:
-    """Exit code, and the outcome for who wants it as JSON."""
-    try:
-        contestants = _contestants(options)
-        out = _folder(options.out)
-    except ParameterError as error:
-        print(f'compare: error: {error}', file=sys.stderr)
-        return 2, {}
+    contestants = _contestants(options)
+    out = writable(options.out)
     print('the closed loop as a library, without ROS: the graph would take hours', flush=True)
     started = time.monotonic()
     warm_up()
@@ -65,7 +56,7 @@ def _compared(options: argparse.Namespace) -> tuple[int, dict[str, Any]]:
         rows, regions = _compare(contestants, options.quick)
     except KeyboardInterrupt:
         print('compare: interrupted', file=sys.stderr)
-        return 130, {'out': str(out)}
+        return INTERRUPTED, {'out': str(out)}
     text = table(rows, regions)
     print('\n' + text + '\n', flush=True)
     from maglev_study.comparison.plot import draw_regions
@@ -82,7 +73,7 @@ def _compared(options: argparse.Namespace) -> tuple[int, dict[str, Any]]:
     print(f'compare: done in {time.monotonic() - started:.0f} s')
     for name in ('comparison.txt', 'comparison.json', 'regions.png'):
         print(f'  {out / name}')
-    return 0, {'out': str(out), 'comparison': json.loads(found)}
+    return DONE, {'out': str(out), 'comparison': json.loads(found)}
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -125,17 +116,6 @@ def _contestants(options: argparse.Namespace) -> list[Contestant]:
         law = control_law(one.controller)
         law.design(one.controller, 'y')
     return found
-
-
-def _folder(path: Path) -> Path:
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        probe = path / '.try'
-        probe.write_bytes(bytes(65536))
-        probe.unlink()
-    except OSError as error:
-        raise ParameterError(f"cannot write to '{path}': {error.strerror}") from error
-    return path.resolve()
 
 
 def _parts(contestants: Sequence[Contestant], quick: bool) -> Iterator[Part]:

@@ -15,8 +15,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from maglev_model.parameters import ParameterError
 from maglev_model.programs.arguments import whole_number
-from maglev_model.programs.progress import Progress, add_output_options, talking
+from maglev_model.programs.progress import Progress, add_output_options
+from maglev_study.command import INTERRUPTED, command, writable
 from maglev_study.faults.campaign import Campaign, Outcome
 from maglev_study.faults.draw import cells, from_json, scenario
 from maglev_study.faults.fly import Scenario
@@ -24,7 +26,7 @@ from maglev_study.faults.judge import RULES
 from maglev_study.faults.page import describe, describe_violations, write
 from maglev_study.faults.tally import Tally
 
-PASS, BROKEN, WRONG_USE, INTERRUPTED = 0, 1, 2, 130
+PASS, BROKEN = 0, 1
 
 _RUNS = 3000
 _SHRUNK = 12  # failures, of different kinds
@@ -36,23 +38,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     0: all rules hold; 1: some do not; 2: wrong use; 130: interrupted, the page tells what was done.
     """
-    options = _parser().parse_args(arguments)
-    with talking(options):
-        code, outcome = _flown(options)
-    if options.json:
-        print(json.dumps({'passed': code == PASS, 'out': str(options.out), **outcome}))
-    return code
+    return command('faults', _parser().parse_args(arguments), _flown)
 
 
 def _flown(options: argparse.Namespace) -> tuple[int, dict[str, Any]]:
-    """Exit code, and the outcome for who wants it as JSON."""
-    try:
-        out = _folder(options.out)
-        if options.replay is not None:
-            return _replay(_run_of(options.replay, options.double), out)
-    except ValueError as error:
-        print(f'faults: error: {error}', file=sys.stderr)
-        return WRONG_USE, {}
+    out = writable(options.out)
+    if options.replay is not None:
+        return _replay(_run_of(options.replay, options.double), out)
     number = len(cells()) if options.short else options.runs
     runs = [
         scenario(seed, double=options.double) for seed in range(options.seed, options.seed + number)
@@ -140,26 +132,18 @@ def _replay(run: Scenario, out: Path) -> tuple[int, dict[str, Any]]:
 
 
 def _run_of(text: str, double: bool) -> Scenario:
-    """The run of a seed, or the first of a file. Raises ValueError for what is neither."""
+    """The run of a seed, or the first of a file. Raises ParameterError for what is neither."""
     if text.isdecimal():
         return scenario(int(text), double=double)
     try:
         plain = json.loads(Path(text).read_text(encoding='utf-8'))
         return from_json(plain[0] if isinstance(plain, list) else plain)
     except OSError as error:
-        raise ValueError(
+        raise ParameterError(
             f"--replay is '{text}', neither a seed nor a file that is there"
         ) from error
     except (KeyError, TypeError, ValueError, IndexError) as error:
-        raise ValueError(f"--replay: '{text}' holds no run: {error!r}") from error
-
-
-def _folder(path: Path) -> Path:
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ValueError(f"cannot write to '{path}': {error.strerror}") from error
-    return path.resolve()
+        raise ParameterError(f"--replay: '{text}' holds no run: {error!r}") from error
 
 
 def _parser() -> argparse.ArgumentParser:

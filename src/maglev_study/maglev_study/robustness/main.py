@@ -8,28 +8,22 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import json
 import os
 import shlex
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from maglev_model.parameters import ParameterError
 from maglev_model.programs.arguments import whole_number
-from maglev_model.programs.optional import MissingLibraryError
-from maglev_model.programs.progress import Progress, add_output_options, talking
+from maglev_model.programs.progress import Progress, add_output_options
+from maglev_study.command import DONE, INTERRUPTED, command, writable
 
 if TYPE_CHECKING:
     from maglev_study.robustness.fleet import Campaign, Plan
     from maglev_study.robustness.fly import Flown
     from maglev_study.robustness.guarantee import Guarantees
-
-DONE, WRONG_USE, INTERRUPTED = 0, 2, 130
-
-Work = Callable[[argparse.Namespace], tuple[int, dict[str, Any]]]
-"""From options to an exit code and what else is to be told of the outcome."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -38,32 +32,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     0: all was flown; 2: wrong use, or no scheduler; 130: interrupted, what was flown is kept.
     """
     return command('robustness', _parser().parse_args(arguments), _flown)
-
-
-def command(name: str, options: argparse.Namespace, work: Work) -> int:
-    """Do the work of a command with ``--out``, and print its outcome for who wants it as JSON.
-
-    What is wrong in its use is said in a line, and is exit code 2; Ctrl-C is exit code 130.
-    """
-    for variable in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS'):
-        os.environ.setdefault(variable, '1')  # before NumPy: its libraries read it once
-    outcome: dict[str, Any] = {}
-    code, reason = WRONG_USE, ''
-    with talking(options):
-        try:
-            code, outcome = work(options)
-        except (ParameterError, MissingLibraryError) as error:
-            reason = str(error)
-        except OSError as error:
-            reason = f"cannot write to '{error.filename}': " if error.filename else ''
-            reason += error.strerror or str(error)
-        except KeyboardInterrupt:
-            code, reason = INTERRUPTED, 'interrupted'
-    if reason:
-        print(f'{name}: error: {reason}', file=sys.stderr)
-    if options.json:
-        print(json.dumps({'passed': code == DONE, 'out': str(options.out), **outcome}))
-    return code
 
 
 def _flown(options: argparse.Namespace) -> tuple[int, dict[str, Any]]:
@@ -230,7 +198,7 @@ def plan_of(options: argparse.Namespace, laws: Sequence[str]) -> Plan:
         overlays=options.overlay,
         seed=options.seed,
     )
-    options.out.mkdir(parents=True, exist_ok=True)
+    writable(options.out)
     return plan
 
 

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 from maglev_model.programs.arguments import not_negative, whole_number
 from maglev_model.programs.progress import Progress
-from maglev_study.robustness.main import DONE, INTERRUPTED, command, command_parser, plan_of
+from maglev_study.command import DONE, INTERRUPTED, command
+from maglev_study.robustness.main import command_parser, plan_of
 
 if TYPE_CHECKING:
     from maglev_study.robustness.tune import Trial, Tuned
