@@ -34,6 +34,8 @@ def command(name: str, options: argparse.Namespace, work: Work) -> int:
             code, outcome = work(options)
         except (ParameterError, MissingLibraryError) as error:
             reason = str(error)
+        except BrokenPipeError:
+            raise  # nobody reads any more
         except OSError as error:
             reason = f"cannot write to '{error.filename}': " if error.filename else ''
             reason += error.strerror or str(error)

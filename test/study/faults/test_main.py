@@ -14,7 +14,7 @@ import pytest
 
 from maglev_study.command import INTERRUPTED, WRONG_USE
 from maglev_study.faults.draw import from_json, scenario, to_json
-from maglev_study.faults.main import BROKEN, PASS, main
+from maglev_study.faults.main import BROKEN, PASS, run
 
 
 @pytest.mark.parametrize(
@@ -34,7 +34,7 @@ def test_bad_arguments_are_refused(
     arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as end:
-        main([*arguments, '--out', str(tmp_path)])
+        run([*arguments, '--out', str(tmp_path)])
     assert end.value.code == WRONG_USE
     assert arguments[0] in capsys.readouterr().err
 
@@ -45,14 +45,14 @@ def test_a_file_without_a_run_is_refused(
 ) -> None:
     path = tmp_path / 'run.json'
     path.write_text(text, encoding='utf-8')
-    assert main(['--replay', str(path), '--out', str(tmp_path)]) == WRONG_USE
+    assert run(['--replay', str(path), '--out', str(tmp_path)]) == WRONG_USE
     assert str(path) in capsys.readouterr().err
-    assert main(['--replay', str(tmp_path / 'none'), '--out', str(tmp_path)]) == WRONG_USE
+    assert run(['--replay', str(tmp_path / 'none'), '--out', str(tmp_path)]) == WRONG_USE
 
 
 def test_a_folder_that_cannot_be_is_refused(tmp_path: Path) -> None:
     (tmp_path / 'file').write_text('', encoding='utf-8')
-    assert main(['--runs', '1', '--out', str(tmp_path / 'file')]) == WRONG_USE
+    assert run(['--runs', '1', '--out', str(tmp_path / 'file')]) == WRONG_USE
 
 
 def test_a_run_is_the_same_by_its_seed_and_from_a_file(
@@ -63,7 +63,7 @@ def test_a_run_is_the_same_by_its_seed_and_from_a_file(
     path.write_text(json.dumps([to_json(scenario(seed))]), encoding='utf-8')
     said = []
     for which in (str(seed), str(path)):
-        code = main(['--replay', which, '--json', '--out', str(tmp_path)])
+        code = run(['--replay', which, '--json', '--out', str(tmp_path)])
         captured = capsys.readouterr()
         said.append(captured.err)
         outcome = json.loads(captured.out)
@@ -81,7 +81,7 @@ def test_a_run_that_hangs_has_a_page_too(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr('maglev_study.faults.train._PATIENCE', 0.0)
-    assert main(['--replay', '50', '--out', str(tmp_path)]) == BROKEN
+    assert run(['--replay', '50', '--out', str(tmp_path)]) == BROKEN
     assert 'the run hangs' in capsys.readouterr().out
     assert 'the run hangs' in (tmp_path / 'run-50.html').read_text(encoding='utf-8')
 
@@ -89,7 +89,7 @@ def test_a_run_that_hangs_has_a_page_too(
 def test_it_leaves_a_page_and_says_by_its_code_whether_rules_were_broken(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    code = main(['--runs', '3', '--jobs', '1', '--out', str(tmp_path)])
+    code = run(['--runs', '3', '--jobs', '1', '--out', str(tmp_path)])
     text = capsys.readouterr().out
     failures = json.loads((tmp_path / 'failures.json').read_text(encoding='utf-8'))
     assert code == (BROKEN if failures else PASS)

@@ -30,7 +30,7 @@ from maglev_study.robustness.draw import NOMINAL
 from maglev_study.robustness.experiments import experiments
 from maglev_study.robustness.fleet import JOURNAL, Campaign, Plan, fly_plan, make_plan
 from maglev_study.robustness.fly import FLOWN, LOST, Flown, fly
-from maglev_study.robustness.main import main
+from maglev_study.robustness.main import run
 from maglev_study.robustness.outcome import Group, groups, influence, worst
 from maglev_study.robustness.page import render, survivors
 from maglev_study.robustness.table import write_table
@@ -218,7 +218,7 @@ def test_the_page_and_the_command(
     monkeypatch.setattr(guarantee, 'GAPS', (0.02, 0.025))
     monkeypatch.setattr(guarantee, 'SETS', 2)
     shutil.copy(whole[1] / JOURNAL, tmp_path)
-    assert main([*call_of(tmp_path), '--json']) == DONE
+    assert run([*call_of(tmp_path), '--json']) == DONE
     captured = capsys.readouterr()
     assert 'robustness: 3 of 3 flown' in captured.err
     outcome = json.loads(captured.out)
@@ -262,7 +262,7 @@ def test_the_command_that_flies_the_worst_machine_finds_its_files(
         os.path.relpath(law),
     ]
     call += ['--overlay', str(PARAMS / 'benchmark.yaml'), '--overlay', os.path.relpath(over)]
-    assert main([*call, '--experiment', 'step_theta', '--out', str(tmp_path)]) == DONE
+    assert run([*call, '--experiment', 'step_theta', '--out', str(tmp_path)]) == DONE
     page = html.unescape((tmp_path / 'robustness.html').read_text(encoding='utf-8'))
     (told,) = re.findall('scenarios/robustness.sh .* --replay 1', page)
     assert shlex.split(told)[3:-2] == [
@@ -287,7 +287,7 @@ def test_without_margins_there_is_a_page_that_says_why(
     monkeypatch.setattr(guarantee, 'GAPS', ())
     monkeypatch.setattr(guarantee, 'HOVERING', guarantee.Place(0.05, 0.0, 0.1, 0))
     shutil.copy(whole[1] / JOURNAL, tmp_path)
-    assert main(call_of(tmp_path)) == DONE
+    assert run(call_of(tmp_path)) == DONE
     page = (tmp_path / 'robustness.html').read_text(encoding='utf-8')
     for said in (capsys.readouterr().out, page):
         assert 'puts y at 0.05 m, it must lie within the stops' in said
@@ -326,12 +326,12 @@ def test_a_campaign_of_other_code_is_refused(
 
 def test_a_machine_is_written_for_the_graph(plan: Plan, tmp_path: Path) -> None:
     call = ['--params', str(PARAMS), '--out', str(tmp_path), '--replay']
-    assert main([*call, '2']) == DONE
+    assert run([*call, '2']) == DONE
     path = tmp_path / 'machine-2.yaml'
     (contestant,) = plan.contestants
     assert from_yaml(PlantParameters, 'plant', path) == plan.draw(contestant, 2).plant
     assert from_yaml(ControllerParameters, 'controller', path) == contestant.controller
-    assert main([*call, '2', '--law', 'paper', 'default']) == WRONG_USE
+    assert run([*call, '2', '--law', 'paper', 'default']) == WRONG_USE
 
 
 @pytest.mark.parametrize(
@@ -347,7 +347,7 @@ def test_a_machine_is_written_for_the_graph(plan: Plan, tmp_path: Path) -> None:
 def test_wrong_use_is_told_in_a_line(
     arguments: list[str], words: str, tmp_path: Path, capsys: Any
 ) -> None:
-    assert main(['--params', str(PARAMS), '--out', str(tmp_path), *arguments]) == WRONG_USE
+    assert run(['--params', str(PARAMS), '--out', str(tmp_path), *arguments]) == WRONG_USE
     said = capsys.readouterr().err
     assert words in said
     assert len(said.splitlines()) == 1
@@ -370,7 +370,7 @@ def test_ctrl_c_among_the_margins_keeps_what_was_flown(
 
     monkeypatch.setattr(Progress, 'tell', interrupted)
     shutil.copy(whole[1] / JOURNAL, tmp_path)
-    assert main(call_of(tmp_path)) == INTERRUPTED
+    assert run(call_of(tmp_path)) == INTERRUPTED
     page = (tmp_path / 'robustness.html').read_text(encoding='utf-8')
     assert 'incomplete' in page
     assert '2 of 2' in page
@@ -381,5 +381,5 @@ def test_ctrl_c_leaves_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
         raise KeyboardInterrupt
 
     monkeypatch.setattr('maglev_model.programs.progress.Progress.tell', interrupted)
-    assert main(['--params', str(PARAMS), '--jobs', '1', '--out', str(tmp_path)]) == INTERRUPTED
+    assert run(['--params', str(PARAMS), '--jobs', '1', '--out', str(tmp_path)]) == INTERRUPTED
     assert 'incomplete' in (tmp_path / 'robustness.html').read_text(encoding='utf-8')

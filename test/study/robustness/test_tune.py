@@ -30,7 +30,7 @@ from maglev_study.robustness.tune import (
     numbers_of,
     with_numbers,
 )
-from maglev_study.robustness.tune_main import NO_BETTER, better, main, render
+from maglev_study.robustness.tune_main import NO_BETTER, better, render, run
 
 PARAMS = Path(__file__).resolve().parents[3] / 'params'
 
@@ -132,7 +132,7 @@ def test_ctrl_c_keeps_the_numbers_that_are_found(
     monkeypatch.setattr(module, 'Search', Known)
     monkeypatch.setattr(module, 'fly_machine', interrupted)
     call = ['--params', str(PARAMS), '--machines', '1', '--jobs', '1', '--out', str(tmp_path)]
-    assert main([*call, '--experiment', 'ellipse', '--trials', '1']) == INTERRUPTED
+    assert run([*call, '--experiment', 'ellipse', '--trials', '1']) == INTERRUPTED
     path = tmp_path / 'tuned.yaml'
     assert path.exists() == bool(trials)
     if trials:
@@ -148,7 +148,7 @@ def test_the_command_leaves_parameters_that_the_controller_takes(
     pytest.importorskip('optuna', reason='needs optuna, which set-up does not install')
     call = ['--params', str(PARAMS), '--machines', '2', '--trials', '3', '--jobs', '1']
     call += ['--experiment', 'step_y', '--out', str(tmp_path)]
-    code = main(call)
+    code = run(call)
     said = capsys.readouterr().out
     assert 'tune: 3 of 3 tried, worst machines by axis' in said
     assert code == (DONE if ' beats ' in said else NO_BETTER)
@@ -156,5 +156,5 @@ def test_the_command_leaves_parameters_that_the_controller_takes(
     assert f'bandwidth: {found.theta.bandwidth}' in said
     (contestant,) = make_plan(PARAMS, 1).contestants
     assert guaranteed(dataclasses.replace(contestant, controller=found)) >= 6.0
-    assert main([*call, '--law', 'paper']) == WRONG_USE
+    assert run([*call, '--law', 'paper']) == WRONG_USE
     assert 'has no bandwidth, integration and learning' in capsys.readouterr().err

@@ -13,10 +13,11 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from maglev_model.parameters import ParameterError
 from maglev_model.programs.arguments import whole_number
+from maglev_model.programs.command import leave_with
 from maglev_model.programs.progress import Progress, add_output_options
 from maglev_study.command import INTERRUPTED, command, writable
 from maglev_study.faults.campaign import Campaign, Outcome
@@ -33,8 +34,13 @@ _SHRUNK = 12  # failures, of different kinds
 _MOST_RUNS = 10_000_000
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point of the executable; its exit code.
+def main() -> NoReturn:
+    """Entry point of the executable."""
+    leave_with(run)
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Run the command and return its exit code.
 
     0: all rules hold; 1: some do not; 2: wrong use; 130: interrupted, the page tells what was done.
     """
@@ -168,4 +174,4 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    main()

@@ -13,10 +13,11 @@ import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from maglev_model.parameters import ParameterError
 from maglev_model.programs.arguments import whole_number
+from maglev_model.programs.command import leave_with
 from maglev_model.programs.progress import Progress, add_output_options
 from maglev_study.command import DONE, INTERRUPTED, command, writable
 
@@ -26,8 +27,13 @@ if TYPE_CHECKING:
     from maglev_study.robustness.guarantee import Guarantees
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point of the executable; its exit code.
+def main() -> NoReturn:
+    """Entry point of the executable."""
+    leave_with(run)
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Run the command and return its exit code.
 
     0: all was flown; 2: wrong use, or no scheduler; 130: interrupted, what was flown is kept.
     """
@@ -213,4 +219,4 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    main()

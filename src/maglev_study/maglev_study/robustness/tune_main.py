@@ -7,11 +7,11 @@ does on machines that it was not tuned on.
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from maglev_model.programs.arguments import not_negative, whole_number
+from maglev_model.programs.command import leave_with
 from maglev_model.programs.progress import Progress
 from maglev_study.command import DONE, INTERRUPTED, command
 from maglev_study.robustness.main import command_parser, plan_of
@@ -22,8 +22,13 @@ if TYPE_CHECKING:
 NO_BETTER = 1
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point of the executable; its exit code.
+def main() -> NoReturn:
+    """Entry point of the executable."""
+    leave_with(run)
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Run the command and return its exit code.
 
     0: what was found is better on some axis and worse on none; 1: it is not; 2: wrong use, or a
     library is missing; 130: interrupted before that was known, what was found is kept.
@@ -98,4 +103,4 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    main()
