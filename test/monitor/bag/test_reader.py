@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import zstandard
 from made_up_run import TOPICS, open_bag, read, write_samples
 from mcap.reader import make_reader
 from mcap.writer import MCAP0_MAGIC
@@ -142,8 +143,42 @@ def test_a_damaged_compressed_file_is_told_as_such(
     half = len(whole) // 2
     damaged = {'cut off': whole[:half], 'empty': b'', 'bytes that are others': whole[:half] * 2}
     file.write_bytes(damaged[damage])
-    with pytest.raises(BagError, match='cannot read the bag'):
+    with pytest.raises(BagError, match=r'cannot read the bag|holds no message'):
         read(tmp_path / 'bag')
+
+
+@pytest.mark.parametrize('mode', [CompressionMode.FILE, CompressionMode.MESSAGE])
+def test_a_compressed_bag_needs_no_metadata_and_is_read_as_far_as_it_goes(
+    mode: CompressionMode, tmp_path: Path, messages: dict[str, list[bytes]], encoder: Any
+) -> None:
+    writer = Writer(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP)
+    writer.set_compression(mode, CompressionFormat.ZSTD)
+    with writer:
+        for key, topic in TOPICS.items():
+            connection = writer.add_connection(*topic, typestore=encoder.store)
+            for data in messages[key]:
+                writer.write(connection, 1, data)
+    (tmp_path / 'bag' / 'metadata.yaml').unlink()
+    (file,) = (tmp_path / 'bag').iterdir()
+    whole = {key: len(messages[key]) for key in TOPICS}
+    assert read(file) == (whole, [])
+    assert read(file.parent)[0] == whole
+    with file.open('r+b') as opened:
+        opened.truncate(file.stat().st_size // 2)
+    counts, notes = read(file.parent)
+    assert 0 < sum(counts.values()) < sum(whole.values())
+    assert 'it was cut off' in notes[0]
+
+
+def test_a_file_that_lies_decompressed_beside_itself_counts_once(
+    bag: Path, tmp_path: Path, run: Any
+) -> None:
+    """As rosbag2 leaves it where it has played one."""
+    copy = tmp_path / 'copy'
+    shutil.copytree(bag, copy)
+    content = (copy / 'bag_0.mcap').read_bytes()
+    (copy / 'bag_0.mcap.zstd').write_bytes(zstandard.compress(content))
+    assert read(copy)[0]['currents'] == len(run)
 
 
 def test_diagnostics_that_are_none_are_told_as_such(tmp_path: Path) -> None:
@@ -223,10 +258,11 @@ def test_other_messages_of_the_same_name_are_refused(tmp_path: Path) -> None:
         read(tmp_path / 'bag')
 
 
+@pytest.mark.parametrize('name', ['bag', 'of.2026.11'])
 def test_files_of_a_bag_are_read_in_the_order_of_their_numbers(
-    tmp_path: Path, run: Any, messages: dict[str, list[bytes]]
+    name: str, tmp_path: Path, run: Any, messages: dict[str, list[bytes]]
 ) -> None:
-    (tmp_path / 'bag').mkdir()
+    (tmp_path / name).mkdir()
     for number in range(12):
         writer = open_bag(tmp_path / f'part{number}')
         part = slice(100 * number, 100 * (number + 1))
@@ -234,8 +270,8 @@ def test_files_of_a_bag_are_read_in_the_order_of_their_numbers(
         writer.write('/stage/currents', zip(messages['currents'][part], stamps, strict=True))
         writer.close()
         file = tmp_path / f'part{number}' / f'part{number}_0.mcap'
-        file.rename(tmp_path / 'bag' / f'bag_{number}.mcap')
-    sequence = [batch.samples['currents']['sequence'] for batch in Bag(tmp_path / 'bag').batches()]
+        file.rename(tmp_path / name / f'{name}_{number}.mcap')
+    sequence = [batch.samples['currents']['sequence'] for batch in Bag(tmp_path / name).batches()]
     np.testing.assert_array_equal(np.concatenate(sequence), np.arange(len(run)))
 
 

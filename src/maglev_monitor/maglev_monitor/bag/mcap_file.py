@@ -2,18 +2,20 @@
 
 A recorder that was killed leaves no footer and no index, perhaps half a chunk. Chunks need neither:
 they are read in the order they were written, up to the last whole one, and of half a chunk that is
-not compressed up to the last whole message.
+not compressed up to the last whole message. What rosbag2 compressed as a whole is read alike.
 """
 
 from __future__ import annotations
 
 import contextlib
 import struct
+import tempfile
 from collections.abc import Iterator
-from io import BytesIO
+from io import SEEK_END, BytesIO
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
+import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile, InvalidMagic, RecordLengthLimitExceeded
 from mcap.opcode import Opcode
@@ -49,7 +51,7 @@ class TopicMessages(NamedTuple):
 class McapFile:
     """An mcap file that is read from front to back.
 
-    ``position`` is how many of its bytes have been read. After :meth:`chunks` is exhausted,
+    ``share`` is how much of it has been read, 0 to 1. After :meth:`chunks` is exhausted,
     ``complete`` tells whether the file ended as it should, and ``damage`` what was wrong otherwise.
     """
 
@@ -57,7 +59,7 @@ class McapFile:
         self.path = path
         self.complete = False
         self.damage = ''
-        self.position = 0
+        self.share = 0.0
         self._schemas: dict[int, str] = {}
         self._channels: dict[int, tuple[str, str]] = {}
         self._messages: dict[int, list[bytes]] = {}  # by channel, since they were handed out
@@ -68,13 +70,15 @@ class McapFile:
         Raises :class:`NoMcapError` when the file is no mcap file, OSError when it cannot be read.
         """
         self.complete, self.damage = False, ''
-        with self.path.open('rb') as file:
+        with self._opened() as file:
+            size = file.seek(0, SEEK_END)
+            file.seek(0)
             try:
                 read_magic(ReadDataStream(file))
             except _CUT_OFF as error:
                 raise NoMcapError(f"'{self.path}' is no mcap file") from error
             for record in self._records(file):
-                self.position = file.tell()
+                self.share = file.tell() / size
                 if isinstance(record, Chunk):
                     self._break_up(record)
                 else:
@@ -87,6 +91,18 @@ class McapFile:
                     self._messages = {}
                 if self.damage:
                     return
+
+    @contextlib.contextmanager
+    def _opened(self) -> Iterator[BinaryIO]:
+        """The file; of one that is compressed as a whole, what of it can be decompressed."""
+        with self.path.open('rb') as file:
+            if self.path.suffix != '.zstd':
+                yield file
+                return
+            with tempfile.TemporaryFile() as plain:
+                with contextlib.suppress(zstandard.ZstdError):
+                    zstandard.ZstdDecompressor().copy_stream(file, plain)
+                yield plain
 
     def _records(self, file: BinaryIO) -> Iterator[McapRecord]:
         """Whole records, and at last what there is of a chunk that was cut off."""

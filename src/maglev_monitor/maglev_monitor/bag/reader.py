@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import yaml
+import zstandard
 from numpy.typing import NDArray
 from rosbags.rosbag2 import Reader
 from rosbags.serde.errors import SerdeError
@@ -24,6 +25,8 @@ from maglev_monitor.metrics.decoding import Records, decode
 
 _DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
 _READER_BATCH = 5000  # messages handed on at once when rosbags reads
+_STORAGES = ('.mcap', '.db3')
+_COMPRESSED = b'\x28\xb5\x2f\xfd'  # how it begins; no CDR does
 
 
 class Diagnostic(NamedTuple):
@@ -81,11 +84,11 @@ class Bag:
         self.notes.clear()
         self._newest = -1
         try:
-            for messages in self._read():
+            for messages in map(_decompressed, self._read()):
                 for topic, _, data in messages:
                     self.counts[topic] = self.counts.get(topic, 0) + len(data)
                 yield self._batch(messages)
-        except (OSError, ValueError, SerdeError) as error:
+        except (OSError, ValueError, SerdeError, zstandard.ZstdError) as error:
             raise self._unreadable(error) from error
         finally:
             if self._progress:
@@ -97,7 +100,7 @@ class Bag:
         return BagError(f"cannot read the bag '{self.path}': {error}")
 
     def _read(self) -> Iterator[list[TopicMessages]]:
-        if self._needs_rosbags():
+        if any(_plain(path).suffix != '.mcap' for path in self.files):
             yield from self._read_by_rosbags()
             return
         sizes = [path.stat().st_size for path in self.files]
@@ -110,7 +113,8 @@ class Bag:
             for messages in file.chunks():
                 recovered += sum(len(topic.data) for topic in messages)
                 if self._progress:
-                    self._progress.tell(sum(sizes[:number]) + file.position, sum(sizes))
+                    read = sum(sizes[:number]) + round(file.share * sizes[number])
+                    self._progress.tell(read, sum(sizes))
                 yield messages
             if not file.complete:
                 self.notes.append(
@@ -120,16 +124,6 @@ class Bag:
                 self.notes.append(f"'{self.path}' has no metadata.yaml: read without it")
         if self._progress:
             self._progress.tell(1, 1)  # what is no message lies behind them
-
-    def _needs_rosbags(self) -> bool:
-        """Whether only rosbags reads this kind of bag: sqlite3, or compressed as a whole."""
-        if any(path.suffix != '.mcap' for path in self.files):
-            return True
-        metadata = self.path / 'metadata.yaml'
-        if not metadata.is_file():
-            return False
-        text = metadata.read_text(encoding='utf-8', errors='replace').lower()
-        return any(f'compression_mode: {mode}' in text for mode in ('message', 'file'))
 
     def _read_by_rosbags(self) -> Iterator[list[TopicMessages]]:
         whole = self.path.is_file() or (self.path / 'metadata.yaml').is_file()
@@ -219,11 +213,12 @@ def _find(path: Path) -> tuple[Path, list[Path]]:
     if path.is_file():
         if path.name == 'metadata.yaml':
             return _find(path.parent)
-        if path.suffix not in ('.mcap', '.db3'):
+        if _plain(path).suffix not in _STORAGES:
             raise BagError(f"'{path}' is no bag: expected a folder, a .mcap or a .db3 file")
         return path, [path]
     for folder in (path, path / 'bag'):
-        files = [*folder.glob('*.mcap'), *folder.glob('*.db3'), *folder.glob('*.zstd')]
+        found = {path for path in folder.glob('*') if _plain(path).suffix in _STORAGES}
+        files = [path for path in found if path == _plain(path) or _plain(path) not in found]
         if files:
             return folder, sorted(files, key=_natural)
     raise BagError(f"there is no bag in '{path}': no .mcap and no .db3 file")
@@ -231,5 +226,21 @@ def _find(path: Path) -> tuple[Path, list[Path]]:
 
 def _natural(path: Path) -> tuple[int, str]:
     """Order of a bag's files: name_2 comes before name_10."""
-    number = path.name.split('.')[0].rsplit('_', 1)[-1]
+    number = _plain(path).stem.rsplit('_', 1)[-1]
     return (int(number) if number.isdigit() else -1, path.name)
+
+
+def _plain(path: Path) -> Path:
+    """What a file is called where rosbag2 has not compressed it as a whole."""
+    return path.with_suffix('') if path.suffix == '.zstd' else path
+
+
+def _decompressed(messages: Sequence[TopicMessages]) -> list[TopicMessages]:
+    """Messages, also those that rosbag2 compressed one by one."""
+    whole = zstandard.ZstdDecompressor()
+    return [
+        each._replace(data=[whole.decompress(data) for data in each.data])
+        if each.data[0].startswith(_COMPRESSED)
+        else each
+        for each in messages
+    ]
