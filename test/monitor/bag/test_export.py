@@ -179,6 +179,14 @@ def test_parquet(bag: Path, whole: Table, tmp_path: Path) -> None:
         np.testing.assert_array_equal(found[name].to_numpy(), whole.columns[name])
 
 
+def test_the_format_is_that_of_the_file_s_name(bag: Path, tmp_path: Path) -> None:
+    assert export([str(bag), '--out', str(tmp_path / 'run.npz')]) == DONE
+    with np.load(tmp_path / 'run.npz') as npz:
+        assert npz['names'].tolist() == NAMES
+    assert export([str(bag), '--out', str(tmp_path / 'run.txt')]) == DONE
+    assert (tmp_path / 'run.txt').read_text().startswith('sample,time,')
+
+
 def test_it_goes_beside_the_bag(bag: Path, tmp_path: Path) -> None:
     (tmp_path / 'bag').symlink_to(bag)
     assert export([str(tmp_path), '--format', 'npz']) == DONE

@@ -25,11 +25,14 @@ def export(arguments: Sequence[str] | None = None) -> int:
     0: the run is written; 2: the bag cannot be read, or the file not be written.
     """
     options = _parser().parse_args(arguments)
-    out = options.out or run_folder(options.bag) / f'samples.{options.format}'
+    form, out = options.format, options.out
+    if form is None:
+        form = out.suffix[1:] if out and out.suffix[1:] in FORMATS else 'csv'
+    out = out or run_folder(options.bag) / f'samples.{form}'
     try:
         found = table(options.bag, Progress('export: read', '%', lines=False))
         written = Progress('export: written', '%', lines=False)
-        files = write(found, out, options.format, written)
+        files = write(found, out, form, written)
     except (BagError, MissingLibraryError) as error:
         return _failed(str(error))
     except OSError as error:
@@ -60,7 +63,7 @@ def _parser() -> argparse.ArgumentParser:
         'bag', type=Path, metavar='BAG', help="a run's folder, a bag, or a bag's file"
     )
     parser.add_argument(
-        '--format', choices=tuple(FORMATS), default='csv', help='(default: %(default)s)'
+        '--format', choices=tuple(FORMATS), help="(default: that of FILE's suffix, or csv)"
     )
     parser.add_argument(
         '--out', type=Path, metavar='FILE', help='(default: samples.FORMAT beside the bag)'
