@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from rclpy.node import Node
 
 from maglev_model.parameters import ParameterError, parameter
 from maglev_node import ros_parameters
+from maglev_node.node import MaglevNode, NodeParameters
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -42,6 +44,20 @@ def declared(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> tuple[Any, boo
         sim_time = node.get_parameter('use_sim_time').value
         assert node.get_parameter('second').value == table.second
         return table, sim_time
+    finally:
+        node.destroy_node()
+        context.shutdown()
+
+
+def started(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> NodeParameters:
+    """The parameters of a node of the project that is started with these ROS arguments."""
+    command = ['plant', '--ros-args', *arguments]
+    monkeypatch.setattr(sys, 'argv', command)
+    context = rclpy.Context()
+    rclpy.init(args=command, context=context)
+    node = MaglevNode('plant', NodeParameters, context=context)
+    try:
+        return node.parameters
     finally:
         node.destroy_node()
         context.shutdown()
@@ -79,3 +95,16 @@ def test_single_values_win(
     for arguments in ((*files, *single), (*single, *files)):
         table, _ = declared(monkeypatch, *where, *arguments, '--', '-p', 'second:=6.0')
         assert table == Table(first=4.0, second=3.0, names=('c',))
+
+
+def test_a_run_s_parameters_fly_another_one_and_stay_as_they_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / 'plant.yaml'
+    processor = min(os.sched_getaffinity(0))
+    started(monkeypatch, '-p', f'effective_parameters:={file}', '-p', f'processors:=[{processor}]')
+    effective = file.read_text()
+    again = started(monkeypatch, '--params-file', str(file), '-p', 'processors:=[]')
+    assert started(monkeypatch, '--params-file', str(file)).processors == (processor,)
+    assert again.processors == ()
+    assert file.read_text() == effective

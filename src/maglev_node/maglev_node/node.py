@@ -199,9 +199,11 @@ class MaglevNode(PollingNode, Generic[P]):
         self._diagnostics.publish(array)
 
     def _write_effective_parameters(self, path: Path) -> None:
+        """All but where they are written: who is given the file leaves it as it is."""
+        written = dataclasses.replace(self.parameters, effective_parameters='')
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(table.to_yaml(self.parameters, self.get_name()), encoding='utf-8')
+            path.write_text(table.to_yaml(written, self.get_name()), encoding='utf-8')
         except OSError as error:
             raise NodeError(
                 f"cannot write the effective parameters to '{path}': {error}"
