@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
@@ -193,6 +194,8 @@ def _become(
     for path in overlays:
         check_overlay(path, sections=heard)
     path = installed(package, executable)
+    # While it imports what it needs, Python would answer with a traceback; leave_with unblocks.
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     os.execv(path, [path, *arguments])
 
 

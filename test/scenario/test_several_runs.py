@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import signal
+import sys
 import time
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from stand_ins import Tree
 from runner.commands import COMMANDS, main
 from runner.options import WrongUseError
 from runner.overlays import PARAMS, check_overlay
-from runner.programs import HEARD_BY_COMPARE, HEARD_BY_ROBUSTNESS
+from runner.programs import HEARD_BY_COMPARE, HEARD_BY_ROBUSTNESS, PROGRAMS
 
 
 @pytest.fixture
@@ -209,6 +210,20 @@ def test_the_comparison_is_told_what_the_user_wants(tree: Tree) -> None:
         f'--params {params} --out here --quick --laws paper default --bandwidth 300'
         f' --overlay {params}/soft.yaml --overlay {tree.path}/heavy.yaml'
     ]
+
+
+@pytest.mark.parametrize('script', sorted(PROGRAMS))
+def test_ctrl_c_while_a_program_imports_ends_it_without_a_word(tree: Tree, script: str) -> None:
+    package = 'maglev_hw_bridge' if script == 'commission' else 'maglev_study'
+    lines = (
+        f'#!{sys.executable}',
+        'import signal',
+        'signal.raise_signal(signal.SIGINT)',
+        'from maglev_model.command import leave_with',
+        'leave_with(lambda: 0)',
+    )
+    tree.executable(package, script, '\n'.join(lines))
+    assert tree.finish(script=script) == (128 + signal.SIGINT, '')
 
 
 @pytest.mark.parametrize('option', ['--stage', '--duration', '--law'])

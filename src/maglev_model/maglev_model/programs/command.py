@@ -16,10 +16,12 @@ def leave_with(command: Callable[[], int]) -> NoReturn:
 
     When whoever reads the standard output has gone, as in ``command | head``, it ends as programs
     that a broken pipe kills do: without a word, 128 + SIGPIPE to a shell; after a Ctrl-C likewise.
-    What cannot be written, as to a disk that is full, is told in a line, with 1.
+    What cannot be written, as to a disk that is full, is told in a line, with 1. A Ctrl-C that
+    whoever started it holds back while modules are imported, by blocking SIGINT, is heeded here.
     """
     try:
         try:
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
             code = command()
         finally:
             if sys.stdout is not None:  # closed by whoever started it
