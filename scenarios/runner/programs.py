@@ -23,6 +23,7 @@ EXPERIMENT = Option(
     'EXPERIMENT...',
     several=True,
 )
+HEARD_BY_FAULTS = ('controller', 'hw_bridge', '**')
 HEARD_BY_COMPARE = ('controller', 'plant', '**')
 HEARD_BY_ROBUSTNESS = (*HEARD_BY_COMPARE, DISTRIBUTIONS)
 
@@ -62,6 +63,12 @@ def _faults(options: Sequence[str]) -> Job:
         '--replay': Option(
             'fly one run alone and draw it: fault, detection, landing', 'SEED|FILE.json'
         ),
+        '--params': Option(
+            'parameters of bridge and controller, as of a machine of your own, from the current\n'
+            'folder or from params/; repeatable, the last one wins',
+            'OVERLAY.yaml',
+            overlay,
+        ),
         '--out': out_option('the page is', 'faults'),
         **OUTPUT,
     }
@@ -69,7 +76,10 @@ def _faults(options: Sequence[str]) -> Job:
     arguments = ['--out', str(out_folder('faults', given))]
     names = ('--runs', '--seed', '--jobs', '--double', '--short', '--replay', *OUTPUT)
     arguments += as_given(table, given, *names)
-    return partial(_become, 'maglev_study', 'faults', arguments)
+    overlays = given.get('--params', [])
+    for file in overlays:
+        arguments += ['--overlay', file]
+    return partial(_become, 'maglev_study', 'faults', arguments, overlays, HEARD_BY_FAULTS)
 
 
 def _robustness(options: Sequence[str]) -> Job:

@@ -219,7 +219,7 @@ def test_ctrl_c_while_a_program_imports_ends_it_without_a_word(tree: Tree, scrip
         f'#!{sys.executable}',
         'import signal',
         'signal.raise_signal(signal.SIGINT)',
-        'from maglev_model.command import leave_with',
+        'from maglev_model.programs.command import leave_with',
         'leave_with(lambda: 0)',
     )
     tree.executable(package, script, '\n'.join(lines))
@@ -257,9 +257,10 @@ def test_an_overlay_may_speak_to_others_too_but_not_to_none(tree: Tree) -> None:
 
 def test_the_fault_campaign_is_told_what_the_user_wants(tree: Tree) -> None:
     tree.behave('faults', '1')
-    options = ('--runs', '9', '--double', '--runs', '40', '--out', 'here')
+    options = ('--runs', '9', '--double', '--runs', '40', '--out', 'here', '--params', 'soft')
     assert tree.finish(*options, script='faults') == (1, '')
-    assert tree.history('faults') == ['--out here --runs 40 --double']
+    overlay = tree.path / 'params' / 'soft.yaml'
+    assert tree.history('faults') == [f'--out here --runs 40 --double --overlay {overlay}']
 
 
 def test_the_drawn_machines_are_told_what_the_user_wants(tree: Tree) -> None:

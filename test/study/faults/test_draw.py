@@ -60,7 +60,7 @@ def test_sizes_of_slips_are_1_to_50_counts_either_way() -> None:
 
 @pytest.mark.parametrize('number', [0, 1, 2, 3])
 def test_a_programme_has_all_phases_one_after_another(number: int) -> None:
-    course = programme(number)
+    course = programme(number, 0.031)
     spans = [course.spans[phase] for phase in PHASES[2:]]
     assert all(start < end for start, end in spans)
     assert all(before[1] <= after[0] for before, after in pairwise(spans))

@@ -21,8 +21,6 @@ from maglev_study.faults.flight import Flight
 from maglev_study.faults.fly import expected_of
 from maglev_study.faults.judge import Judge, Verdict
 from maglev_study.faults.kinds import Fault
-from maglev_study.faults.machines import machine
-from maglev_study.faults.programme import programme
 
 Flown = Callable[..., Verdict]
 KILLED = Fault('controller: killed')
@@ -79,10 +77,10 @@ def test_1_what_is_hidden_and_never_found_out(
 def test_1_a_stuck_encoder_is_hidden_while_all_others_stand_still(
     others: float, hidden: bool
 ) -> None:
-    judge = Judge(Flight(machine(0), programme(0)))
+    judge = Judge(Flight(0))
     judge._n = 100
     judge._state[:100, 0] = 0.025
-    judge._shift[50:100, 5] = np.arange(50)
+    judge._shift[50:100, 5] = 1e-5 * np.arange(50)
     judge._state[90, 2] = others
     assert judge._is_hidden((5,), 99) == hidden
     assert not judge._is_hidden((), 99)
@@ -118,7 +116,7 @@ def test_2_a_cut_that_is_foretold_too_mildly(flown: Flown, monkeypatch: pytest.M
 
 def test_2_a_cut_is_judged_by_the_hardest_stop_of_its_fall() -> None:
     """A tilting platen taps the lower stop with its edge, then the magnets lift it."""
-    judge = Judge(Flight(machine(0), programme(0)))
+    judge = Judge(Flight(0))
     judge._state[0] = 0.0
     judge._state[0, [0, 1, 8, 9]] = 0.03086, -0.044, 0.77e-3, 0.25
     assert judge._fall_from(0) > 0.3

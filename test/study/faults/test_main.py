@@ -50,6 +50,25 @@ def test_a_file_without_a_run_is_refused(
     assert run(['--replay', str(tmp_path / 'none'), '--out', str(tmp_path)]) == WRONG_USE
 
 
+@pytest.mark.parametrize(
+    ('given', 'named'),
+    [
+        ('sample_time: 0.0005', "'sample_time' is 0.0005"),
+        ('machine: {gap_max: 0.030}', "'machine.gap_max' is 0.03"),
+        ('machine: {mass_y: -7.0}', "'machine.mass_y' is -7"),
+        ('fault: {jmup: 1.0}', "'fault.jmup'"),
+    ],
+)
+def test_a_machine_that_cannot_fly_the_programme_is_refused(
+    given: str, named: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / 'mine.yaml'
+    path.write_text(f'hw_bridge:\n  ros__parameters:\n    {given}\n', encoding='utf-8')
+    options = ['--runs', '1', '--overlay', str(path), '--out', str(tmp_path)]
+    assert run(options) == WRONG_USE
+    assert named in capsys.readouterr().err
+
+
 def test_a_folder_that_cannot_be_is_refused(tmp_path: Path) -> None:
     (tmp_path / 'file').write_text('', encoding='utf-8')
     assert run(['--runs', '1', '--out', str(tmp_path / 'file')]) == WRONG_USE

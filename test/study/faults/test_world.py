@@ -8,14 +8,12 @@ import pytest
 from maglev_hw_bridge.emulation.card import HILError
 from maglev_study.faults.flight import Flight
 from maglev_study.faults.hardware_faults import INTERRUPTED
-from maglev_study.faults.machines import machine
-from maglev_study.faults.programme import programme
 
 
 @pytest.fixture
 def flight() -> Flight:
     """Lifted off, on a machine that is not what it is believed to be."""
-    flight = Flight(machine(2), programme(2))
+    flight = Flight(2)
     assert flight.bridge.configure()
     assert flight.bridge.home(vouched=True)
     assert flight.bridge.activate()

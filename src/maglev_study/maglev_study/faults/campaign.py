@@ -13,6 +13,7 @@ from typing import NamedTuple, TypeVar
 from maglev_model.programs.command import noted
 from maglev_study.faults.fly import Scenario
 from maglev_study.faults.judge import Verdict
+from maglev_study.faults.machines import PLAIN, Believed
 from maglev_study.faults.shrink import shrink
 from maglev_study.faults.train import fly_all, warm_up
 
@@ -36,14 +37,14 @@ class Campaign:
     Ctrl-C ends what is under way after the run that it is at; what was done so far is kept.
     """
 
-    def __init__(self, jobs: int) -> None:
-        self._jobs = jobs
+    def __init__(self, jobs: int, believed: Believed = PLAIN) -> None:
+        self._jobs, self._believed = jobs, believed
         self.interrupted = False
 
     def __enter__(self) -> Campaign:
         context = multiprocessing.get_context('fork')
         self._stop = context.Event()
-        warm_up()
+        warm_up(self._believed)
         self._pool = ProcessPoolExecutor(self._jobs, context, _begin, (self._stop,))
         return self
 
@@ -57,13 +58,15 @@ class Campaign:
         Raises RuntimeError when a machine does not fly even without a fault.
         """
         by_machine = [list(group) for _, group in groupby(runs, key=lambda run: run.machine)]
-        self._do([self._pool.submit(_fly, part) for part in by_machine], heard)
+        flown = [self._pool.submit(_fly, part, self._believed) for part in by_machine]
+        self._do(flown, heard)
 
     def shrink(
         self, failures: Sequence[Outcome], heard: Callable[[tuple[Outcome, Outcome]], None]
     ) -> None:
         """Make failures as small as they still fail, handing over each with what it became."""
-        self._do([self._pool.submit(_shrink, failure) for failure in failures], heard)
+        tried = [self._pool.submit(_shrink, failure, self._believed) for failure in failures]
+        self._do(tried, heard)
 
     def _do(self, futures: list[Future[T]], heard: Callable[[T], None]) -> None:
         if self.interrupted:
@@ -94,9 +97,9 @@ def _stopped() -> bool:
     return _stop is not None and _stop.is_set()
 
 
-def _fly(runs: Sequence[Scenario]) -> list[Outcome]:
-    return [Outcome(run, verdict) for run, verdict in fly_all(runs, _stopped)]
+def _fly(runs: Sequence[Scenario], believed: Believed) -> list[Outcome]:
+    return [Outcome(run, verdict) for run, verdict in fly_all(runs, believed, _stopped)]
 
 
-def _shrink(failure: Outcome) -> tuple[Outcome, Outcome]:
-    return failure, Outcome(*shrink(failure.run, failure.verdict, _stopped))
+def _shrink(failure: Outcome, believed: Believed) -> tuple[Outcome, Outcome]:
+    return failure, Outcome(*shrink(failure.run, failure.verdict, believed, _stopped))

@@ -22,8 +22,8 @@ from maglev_hw_bridge.stage import BridgeStage
 from maglev_model.axes import FloatArray
 from maglev_model.contract.controller_watch import ControllerWatch, Verdict
 from maglev_model.contract.stage import EncoderSample, Fault, StageError
-from maglev_model.parameters import build
-from maglev_study.faults.programme import RESET, STOP, Programme
+from maglev_study.faults.machines import PLAIN, Believed, machine
+from maglev_study.faults.programme import RESET, STOP, programme
 from maglev_study.faults.world import World
 
 _LONGEST_GAP = 20  # samples a controller misses before it gives up
@@ -219,8 +219,8 @@ class Bridge:
 class Controller:
     """The controller's process."""
 
-    def __init__(self) -> None:
-        self.supervisor = Supervisor(build(ControllerParameters, {'input_delay': 1}))
+    def __init__(self, parameters: ControllerParameters) -> None:
+        self.supervisor = Supervisor(parameters)
         self.alive = True
         self.stalled = False
         self.pace = 1.0  # samples answered per sample
@@ -283,13 +283,17 @@ class Controller:
 
 
 class Flight:
-    """The world, a bridge, a controller and a programme; one :meth:`step` a sample."""
+    """The world, a bridge, a controller and a programme; one :meth:`step` a sample.
 
-    def __init__(self, parameters: BridgeParameters, course: Programme) -> None:
-        self.parameters, self.course = parameters, course
-        self.world = World(parameters)
-        self.bridge = Bridge(parameters, self.world)
-        self.controller = Controller()
+    Those of the machine ``number`` among the ones that differ from what is believed.
+    """
+
+    def __init__(self, number: int, believed: Believed = PLAIN) -> None:
+        self.parameters = machine(number, believed)
+        self.course = programme(number, self.parameters.machine.gap_max)
+        self.world = World(self.parameters)
+        self.bridge = Bridge(self.parameters, self.world)
+        self.controller = Controller(believed.controller)
         self.inbox: list[Answer] = []
         self.samples = 0  # stepped
         self.acting = True  # the operator goes on with the programme

@@ -101,7 +101,7 @@ class Course:
             return self._refused()
         self.begin(0)
         if phase == 'homing' and bridge.alive and not self.flight.skip_homing:
-            self.judge.baseline[:] = self.flight.world.deviation  # zeros are defined anew
+            self.judge.anew()  # zeros are defined anew
             if not bridge.home():
                 return self._refused()
         return bridge.alive and (bridge.activate() or self._refused())

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from maglev_hw_bridge.emulation.card import HILError
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES
@@ -20,8 +21,10 @@ INTERRUPTED = -35
 
 # -- encoders --------------------------------------------------------------------------------------
 
-SHOWS = np.array([30, 30, 30, 30, 40, 40])
-"""Counts an encoder is off the truth from which on it must be found out."""
+SHOWS = np.array([3e-4, 3e-4, 3e-4, 3e-4, 4e-4, 4e-4])
+"""How far an encoder is off the truth, beyond which it must be found out [m]."""
+
+_COUNT = 1e-5  # what sizes of encoders' faults are drawn in, whatever their resolution [m]
 
 _DISPENSABLE = 2
 """Gap encoders that the model can stand in for."""
@@ -51,17 +54,21 @@ def encoders(name: str, which: str) -> Kind:
         size = float(rng.integers(low, high + 1) * (rng.choice((-1, 1)) if low else 1))
         return Fault(row, tuple(targets), size)
 
+    def counts(run: Run, fault: Fault) -> NDArray[np.int64]:
+        resolution = np.array(run.flight.parameters.encoder.resolution)[list(fault.targets)]
+        return np.rint(fault.size * _COUNT / resolution).astype(np.int64)
+
     def begin(run: Run, fault: Fault) -> None:
         world, targets = run.flight.world, list(fault.targets)
         if name == 'stuck':
             world.stuck[targets] = True
         elif name == 'noise':
-            world.noise[targets] = abs(int(fault.size))
+            world.noise[targets] = abs(counts(run, fault))
         elif name == 'reset':
             world.jumps[targets] -= world.rig.counts()[targets] + world.jumps[targets]
         else:
             signs = run.rng.choice((-1, 1), len(targets)) if len(targets) > 1 else 1
-            world.jumps[targets] += int(fault.size) * signs
+            world.jumps[targets] += counts(run, fault) * signs
 
     def expected(fault: Fault) -> Expected:
         gaps = sum(target < 4 for target in fault.targets)

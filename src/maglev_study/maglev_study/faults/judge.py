@@ -9,7 +9,6 @@ import re
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from maglev_hw_bridge.emulation.rig import Rig
 from maglev_model.axes import FloatArray
@@ -32,8 +31,9 @@ _QUIET = 1e-6  # [V]
 _FLYING = 1e-4  # above the lower stop [m]
 _OFF_COURSE = (1.5e-3, 3e-3, 3e-3)  # of y, x, z while nothing is found out [m]
 _STILL = 5e-5  # what the others count at most while a fault is hidden [m]
-_HIDDEN = np.array([200, 200, 200, 200, 500, 500])
-"""Counts a stuck encoder is off the truth by when forces alone must have told of it."""
+_HIDDEN = np.array([2e-3, 2e-3, 2e-3, 2e-3, 5e-3, 5e-3])
+"""How far a stuck encoder is off the truth when forces alone must have told of it [m]."""
+_ROUNDING = 1e-9  # [m]
 _FALL = 600  # longest, without current [samples]
 _CUT_SAMPLES = 3
 _WATCHDOG = 20  # [samples]
@@ -64,13 +64,14 @@ class Judge:
         self.ended: int | None = None  # tick of the terminal state
         self.released: int | None = None  # tick of the end of the process
         self.problems: list[tuple[int, str]] = []
-        self.baseline = world.deviation.copy()
+        self._resolution = np.array(flight.parameters.encoder.resolution)
+        self.anew()
         self.may_enable = False  # a reset has gone well, or the process was started again
         self.enable_counts = True  # the enable line does what the bridge tells it,
         self.output_counts = True  # and so do the outputs
         self._state = np.zeros((_LONGEST, 10))
         self._volts = np.zeros((_LONGEST, 16))
-        self._shift = np.zeros((_LONGEST, 6), dtype=np.int64)
+        self._shift = np.zeros((_LONGEST, 6))  # what encoders read beside the truth [m]
         self._course = np.full((_LONGEST, 3), np.nan)
         self._enabled = np.zeros(_LONGEST, dtype=bool)
         self._phase_channels = world._outputs[0] * 8 + world._outputs[1]
@@ -88,7 +89,7 @@ class Judge:
             raise RuntimeError('the run does not end')
         self._state[n] = world.rig.stage.state
         self._volts[n] = world.volts.ravel()
-        self._shift[n] = world.deviation
+        self._shift[n] = self._beside()
         enabled = world.enabled
         self._enabled[n] = enabled and not self.may_enable and self.enable_counts
         if enabled and not self._enabled_before and self.flight.forbidden:
@@ -115,6 +116,13 @@ class Judge:
         if self.seen is None:
             self.seen, self.reason = self._n, reason
 
+    def anew(self) -> None:
+        """What the encoders read now is taken for the truth."""
+        self.baseline = self._beside()
+
+    def _beside(self) -> FloatArray:
+        return self._resolution * self.flight.world.deviation
+
     def end(self) -> None:
         """A terminal state is reached."""
         self.ended = self._n
@@ -134,10 +142,13 @@ class Judge:
         return self._n
 
     def log(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """True states (n, 10), outputs (n, 16) [V], counts off the truth (n, 6), enable (n,)."""
+        """True states (n, 10), outputs (n, 16) [V], encoders beside the truth (n, 6) [m], enable.
+
+        Of shape (n,), the last.
+        """
         n = self._n
         shift, enabled = self._shift[:n] - self.baseline, self._enabled[:n]
-        return self._state[:n], self._volts[:n], shift.astype(np.float64), enabled.astype(float)
+        return self._state[:n], self._volts[:n], shift, enabled.astype(float)
 
     def marks(self, shows: list[int]) -> dict[str, int]:
         """What happened at which sample of the log."""
@@ -186,8 +197,8 @@ class Judge:
     def _floor(self) -> float:
         return self.flight.parameters.machine.gap_max
 
-    def _first_sign(self, shows: list[int], most: NDArray[np.int64] = SHOWS) -> int | None:
-        wrong = np.any(np.abs(self._shift[: self._n] - self.baseline) > most, axis=1)
+    def _first_sign(self, shows: list[int], most: FloatArray = SHOWS) -> int | None:
+        wrong = np.any(np.abs(self._shift[: self._n] - self.baseline) > most + _ROUNDING, axis=1)
         signs = [int(np.argmax(wrong))] if wrong.any() else []
         return min([*shows, *signs], default=None)
 
@@ -200,7 +211,7 @@ class Judge:
         if not stuck or first is None:
             return False
         off = np.abs(self._shift[: first + 1] - self.baseline)[:, stuck].max(axis=1)
-        begun = max(int(np.argmax(off > 0)) - 1, 0)
+        begun = max(int(np.argmax(off > _ROUNDING)) - 1, 0)
         others = [encoder for encoder in range(6) if encoder not in stuck]
         moved = np.ptp(self._lengths(slice(begun, first + 1))[:, others], axis=0)
         return bool(others) and bool(np.all(moved <= _STILL))

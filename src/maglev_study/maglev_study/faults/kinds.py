@@ -27,7 +27,7 @@ class Fault:
 
     kind: str
     targets: tuple[int, ...] = ()  # encoders, phases, or a board
-    size: float = 0.0  # counts, samples, share: by kind
+    size: float = 0.0  # tens of micrometres, samples, share: by kind
     call: str = ''  # of the vendor's module
     delay: int = 0  # [samples]
 

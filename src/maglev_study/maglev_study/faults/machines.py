@@ -1,15 +1,18 @@
-"""Machines that differ from what the bridge and the controller believe, drawn by number."""
+"""What bridge and controller believe, and machines that differ from it, drawn by number."""
 
 from __future__ import annotations
 
 import math
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
+from maglev_controller.parameters import ControllerParameters
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_model.guide import GuideParameters
-from maglev_model.parameters import build
+from maglev_model.parameters import ParameterError, from_yaml, replace
 from maglev_plant.parameters import OffsetParameters
+from maglev_study.faults.programme import PERIOD, ROOM
 
 STOP_INPUT = 0
 ENABLE_OUTPUT = 1
@@ -26,6 +29,7 @@ _SQUARE_ERROR = 0.1  # of K_v2's own error
 _STREAM = 7919  # keeps these draws apart from all others that have the same number
 
 _COMMON: dict[str, object] = {
+    'driver': 'emulated',
     'homing.x': 0.0,
     'homing.z': 0.0,
     'boards.stop_input': STOP_INPUT,
@@ -33,20 +37,60 @@ _COMMON: dict[str, object] = {
 }
 
 
-def machine(number: int) -> BridgeParameters:
+class Believed(NamedTuple):
+    """What the bridge and the controller take their machine for."""
+
+    bridge: BridgeParameters
+    controller: ControllerParameters
+
+
+def believed(*files: Path) -> Believed:
+    """From parameter files, the later winning; each may have sections of both nodes, and ``/**``.
+
+    Currents answer the sample before, as in real time. Raises ParameterError for what is wrong in
+    the files, and for a machine that cannot fly the programme.
+    """
+    bridge = from_yaml(BridgeParameters, 'hw_bridge', *files)
+    controller = from_yaml(ControllerParameters, 'controller', *files)
+    _check_room(bridge)
+    late = {'input_delay': max(controller.input_delay, 1)}
+    return Believed(bridge, replace(controller, late))
+
+
+def _check_room(bridge: BridgeParameters) -> None:
+    if bridge.sample_time != PERIOD:
+        raise ParameterError(
+            f"parameter 'sample_time' is {bridge.sample_time:g}: the programme that is flown has"
+            f' samples of {PERIOD:g} s'
+        )
+    for name, (lower, upper) in ROOM.items():
+        value = getattr(bridge.machine, name)
+        if not lower <= value <= upper:
+            raise ParameterError(
+                f"parameter 'machine.{name}' is {value:g}: for the programme that is flown it must"
+                f' lie in [{lower:g}, {upper:g}]'
+            )
+
+
+PLAIN = believed()
+"""The default parameters of both."""
+
+
+def machine(number: int, believed: Believed = PLAIN) -> BridgeParameters:
     """Parameters of the bridge, with those of the machine behind its boards, by number."""
+    bridge = believed.bridge
     if number == NOMINAL:
-        return build(BridgeParameters, _COMMON)
+        return replace(bridge, _COMMON)
     rng = np.random.default_rng([_STREAM, number])
     wrong = {
         name: float(1.0 + rng.uniform(-_MODEL_ERROR, _MODEL_ERROR))
         for name in OffsetParameters.__dataclass_fields__
     }
     wrong['K_v2'] = _coupling(wrong)
-    coulomb = np.array(GuideParameters().coulomb) * rng.uniform(*_FRICTION, 5)
+    coulomb = np.array(bridge.emulation.guide.coulomb) * rng.uniform(*_FRICTION, 5)
     offset = rng.uniform(-_MOST_OFFSET, _MOST_OFFSET, 12).tolist()
-    return build(
-        BridgeParameters,
+    return replace(
+        bridge,
         {
             **_COMMON,
             **{f'emulation.offset.{name}': share for name, share in wrong.items()},

@@ -24,6 +24,7 @@ from maglev_study.faults.campaign import Campaign, Outcome
 from maglev_study.faults.draw import cells, from_json, scenario
 from maglev_study.faults.fly import Scenario
 from maglev_study.faults.judge import RULES
+from maglev_study.faults.machines import Believed, believed
 from maglev_study.faults.page import describe, describe_violations, write
 from maglev_study.faults.tally import Tally
 
@@ -48,17 +49,19 @@ def run(arguments: Sequence[str] | None = None) -> int:
 
 
 def _flown(options: argparse.Namespace) -> tuple[int, dict[str, Any]]:
-    out = writable(options.out)
+    out, given = writable(options.out), believed(*options.overlay)
     if options.replay is not None:
-        return _replay(_run_of(options.replay, options.double), out)
+        return _replay(_run_of(options.replay, options.double), given, out)
     number = len(cells()) if options.short else options.runs
     runs = [
         scenario(seed, double=options.double) for seed in range(options.seed, options.seed + number)
     ]
-    return _fly(runs, options.jobs, out)
+    return _fly(runs, given, options, out)
 
 
-def _fly(runs: Sequence[Scenario], jobs: int, out: Path) -> tuple[int, dict[str, Any]]:
+def _fly(
+    runs: Sequence[Scenario], given: Believed, options: argparse.Namespace, out: Path
+) -> tuple[int, dict[str, Any]]:
     started = time.monotonic()
     outcomes: list[Outcome] = []
     shrunk: list[tuple[Outcome, Outcome]] = []
@@ -73,11 +76,12 @@ def _fly(runs: Sequence[Scenario], jobs: int, out: Path) -> tuple[int, dict[str,
 
     def report() -> Path:
         spent = time.monotonic() - started
-        words = [f'{len(outcomes)} of {len(runs)} runs', f'{spent:.0f} s', f'{jobs} processes']
-        words.append(f'seeds {runs[0].seed} to {runs[-1].seed}')
+        words = [f'{len(outcomes)} of {len(runs)} runs', f'{spent:.0f} s']
+        words += [f'{options.jobs} processes', f'seeds {runs[0].seed} to {runs[-1].seed}']
+        words += [f'params {path.name}' for path in options.overlay]
         return write(out, tally, shrunk, words, len(outcomes) == len(runs))
 
-    with Campaign(jobs) as campaign:
+    with Campaign(options.jobs, given) as campaign:
         campaign.fly(runs, heard)
         progress.end()
         tally = Tally(sorted(outcomes, key=lambda one: one.run.seed))
@@ -116,11 +120,11 @@ def _tell(tally: Tally, shrunk: Sequence[tuple[Outcome, Outcome]], path: Path) -
     print(f'page: {path}')
 
 
-def _replay(run: Scenario, out: Path) -> tuple[int, dict[str, Any]]:
+def _replay(run: Scenario, given: Believed, out: Path) -> tuple[int, dict[str, Any]]:
     from maglev_monitor.metrics.result_file import write_whole
     from maglev_study.faults.replay import draw, replay
 
-    record = replay(run)
+    record = replay(run, given)
     path = out / f'run-{run.seed}.html'
     write_whole(path, draw(record))
     verdict = record.verdict
@@ -168,6 +172,14 @@ def _parser() -> argparse.ArgumentParser:
     add('--double', action='store_true', help='a second fault up to 0.5 s after the first')
     add('--short', action='store_true', help='one run of each cell of fault and phase')
     add('--replay', metavar='SEED|FILE', help='fly one run alone, and draw it')
+    add(
+        '--overlay',
+        type=Path,
+        action='append',
+        default=[],
+        metavar='FILE',
+        help='parameters of bridge and controller, repeatable',
+    )
     add('--out', type=Path, default=Path('faults'), metavar='DIR', help='where the page is left')
     add_output_options(parser)
     return parser

@@ -35,7 +35,16 @@ PHASES = (
 ON_THE_GROUND = ('homing', 'arming', 'rest', 'after a fault', 'reset')
 BEFORE_THE_FIRST_SAMPLE = ('homing', 'arming')
 
-_REST = np.array([0.031, 0.0, 0.0, 0.0, 0.0])
+ROOM: Mapping[str, tuple[float, float]] = {
+    'motors': (4, 4),
+    'gap_min': (0.0, 0.018),
+    'gap_max': (0.031, 1.0),
+    'x_max': (0.05, 1.0),
+    'z_max': (0.05, 1.0),
+    'theta_max': (0.014, 1.0),
+}
+"""What the programme takes of a machine, by its parameter [m, rad]."""
+
 _HEIGHTS = (0.0186, 0.0305)  # of hovering [m]
 _THETA = 0.01  # amplitude of the ellipse [rad]
 _GROW = 0.8  # of the ellipse, and to shrink again [s]
@@ -67,11 +76,11 @@ class Programme:
 
 
 class _Maker:
-    def __init__(self) -> None:
+    def __init__(self, floor: float) -> None:
         self.parts: list[References] = []
         self.kind: list[int] = []
         self.spans: dict[str, tuple[int, int]] = dict.fromkeys(BEFORE_THE_FIRST_SAMPLE, (0, 0))
-        self.place = _REST
+        self.rest = self.place = _at(y=floor)
 
     def add(self, kind: Phase, *parts: References, name: str = '') -> None:
         start = len(self.kind)
@@ -92,11 +101,14 @@ class _Maker:
         return held(place, time, PERIOD)
 
 
-def programme(number: int) -> Programme:
-    """The programme of a machine; even ones are landed by the controller, odd by the bridge."""
+def programme(number: int, floor: float) -> Programme:
+    """The programme of a machine; even ones are landed by the controller, odd by the bridge.
+
+    ``floor`` is the gap at its lower stop [m].
+    """
     rng = np.random.default_rng([104729, number])
-    make = _Maker()
-    make.add(Phase.REST, make.stay(_REST, 0.05), name='rest')
+    make = _Maker(floor)
+    make.add(Phase.REST, make.stay(make.rest, 0.05), name='rest')
     make.add(Phase.LIFT_OFF, make.go(HOVER, 0.8, 0.1), name='lift-off')
     heights = [_at(y=y) for y in rng.uniform(*_HEIGHTS, 3)]
     make.add(Phase.HOLD, *(make.go(place, 0.4, 0.3) for place in heights), name='hover')
@@ -113,7 +125,7 @@ def programme(number: int) -> Programme:
     )
     make.add(Phase.HOLD, make.go(HOVER, 0.7, 0.1))
     actions = _end(make, by_bridge=number % 2 == 1)
-    make.add(Phase.REST, make.stay(_REST, 0.1))
+    make.add(Phase.REST, make.stay(make.rest, 0.1))
     make.add(Phase.LIFT_OFF, make.go(HOVER, 0.8, 0.0))
     make.add(Phase.HOLD, make.go(_at(y=rng.uniform(0.02, 0.029), x=0.02), 0.6, 3.0))
     return Programme(joined(*make.parts), tuple(make.kind), make.spans, actions)
@@ -158,13 +170,13 @@ def _end(make: _Maker, *, by_bridge: bool) -> dict[int, str]:
         make.add(Phase.HOLD, make.stay(HOVER, 2.5))
         stop = start
     else:
-        make.add(Phase.LAND, make.go(_REST, 1.5, 0.1))
-        make.add(Phase.REST, make.stay(_REST, 0.1))
+        make.add(Phase.LAND, make.go(make.rest, 1.5, 0.1))
+        make.add(Phase.REST, make.stay(make.rest, 0.1))
         stop = len(make.kind) - 1
     for third in range(3):
         begin = start + third * _THIRD
         make.spans[f'landing {third + 1}/3'] = (begin, begin + _THIRD)
-    make.add(Phase.REST, make.stay(_REST, 0.1), name='after a fault')
+    make.add(Phase.REST, make.stay(make.rest, 0.1), name='after a fault')
     reset = len(make.kind)
-    make.add(Phase.REST, make.stay(_REST, 0.1), name='reset')
+    make.add(Phase.REST, make.stay(make.rest, 0.1), name='reset')
     return {stop: STOP, reset: RESET}

@@ -11,10 +11,11 @@ from maglev_study.faults.campaign import Outcome
 from maglev_study.faults.flight import Flight
 from maglev_study.faults.fly import Course, Scenario
 from maglev_study.faults.judge import Verdict
+from maglev_study.faults.machines import PLAIN, Believed
 from maglev_study.faults.page import describe, describe_violations
 from maglev_study.faults.train import fly_all
 
-_SHIFT = 1e-2  # mm a count
+_MOST = 5.0  # that is drawn of an encoder beside the truth [mm]
 
 
 class Record(NamedTuple):
@@ -24,14 +25,14 @@ class Record(NamedTuple):
     verdict: Verdict
     state: FloatArray  # true x1..x10 (n, 10)
     volts: FloatArray  # outputs of both boards (n, 16)
-    shift: FloatArray  # counts of the encoders off the truth (n, 6)
+    shift: FloatArray  # what the encoders read beside the truth (n, 6) [m]
     enabled: FloatArray  # whether the amplifiers are (n,)
     marks: dict[str, int]  # what happened at which sample
 
 
-def replay(run: Scenario) -> Record:
+def replay(run: Scenario, believed: Believed = PLAIN) -> Record:
     """Fly one run and keep its log."""
-    ((_, outcome),) = fly_all([run], work=_record)
+    ((_, outcome),) = fly_all([run], believed, work=_record)
     if isinstance(outcome, Verdict):  # it hung, or died
         return Record(
             run, outcome, np.zeros((0, 10)), np.zeros((0, 16)), np.zeros((0, 6)), np.zeros(0), {}
@@ -79,7 +80,7 @@ def _plot(record: Record):  # type: ignore[no-untyped-def]
         rows[0].set(title='true air gap y', ylabel='mm')
         rows[1].plot(time, state[:, 2:5:2], label=('x', 'z'))
         rows[1].set(title='true displacements', ylabel='mm')
-        rows[2].plot(time, _SHIFT * np.clip(record.shift, -500, 500), label=_ENCODERS)
+        rows[2].plot(time, np.clip(1e3 * record.shift, -_MOST, _MOST), label=_ENCODERS)
         rows[2].set(title='what the encoders count off the truth, to 5 mm', ylabel='mm')
         rows[3].plot(time, record.volts)
         rows[3].set(title='outputs of both boards', ylabel='V')

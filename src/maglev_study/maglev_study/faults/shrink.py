@@ -9,7 +9,7 @@ from maglev_study.faults.catalogue import KINDS
 from maglev_study.faults.fly import Scenario
 from maglev_study.faults.judge import Verdict
 from maglev_study.faults.kinds import Fault
-from maglev_study.faults.machines import NOMINAL
+from maglev_study.faults.machines import NOMINAL, PLAIN, Believed
 from maglev_study.faults.train import fly_all
 
 _SIMPLE = (('rest', 0.5), ('hover', 0.98), ('lift-off', 0.5), ('ellipse', 0.5))
@@ -19,7 +19,10 @@ _MOST = 8  # tries
 
 
 def shrink(
-    run: Scenario, verdict: Verdict, stopped: Callable[[], bool] = lambda: False
+    run: Scenario,
+    verdict: Verdict,
+    believed: Believed = PLAIN,
+    stopped: Callable[[], bool] = lambda: False,
 ) -> tuple[Scenario, Verdict]:
     """The smallest run found that breaks the rule that this one broke first, and its verdict."""
     rule = verdict.violations[0][0]
@@ -30,7 +33,7 @@ def shrink(
             if tries >= _MOST or stopped():
                 return run, verdict
             tries += 1
-            ((_, outcome),) = fly_all([smaller])
+            ((_, outcome),) = fly_all([smaller], believed)
             if any(broken == rule for broken, _ in outcome.violations):
                 run, verdict, found = smaller, outcome, True
                 break

@@ -22,8 +22,8 @@ from maglev_study.faults.flight import Flight
 from maglev_study.faults.fly import Scenario, fly
 from maglev_study.faults.judge import Verdict
 from maglev_study.faults.kinds import Fault
-from maglev_study.faults.machines import NOMINAL, machine
-from maglev_study.faults.programme import BEFORE_THE_FIRST_SAMPLE, programme
+from maglev_study.faults.machines import NOMINAL, PLAIN, Believed
+from maglev_study.faults.programme import BEFORE_THE_FIRST_SAMPLE
 
 _PATIENCE = 60.0  # with a run, but for what it waits for a processor [s]
 
@@ -31,23 +31,24 @@ T = TypeVar('T')
 
 
 @functools.cache
-def warm_up() -> None:
+def warm_up(believed: Believed = PLAIN) -> None:
     """Compile all that a run calls, from homing to restart, before processes branch off.
 
     Each would do it again otherwise, for longer than a run may take where nothing is cached yet.
     """
-    flight = Flight(machine(NOMINAL), programme(NOMINAL))
+    flight = Flight(NOMINAL, believed)
     fly(flight, Scenario(NOMINAL, BEFORE_THE_FIRST_SAMPLE[0], 0.0, (Fault('none'),), 0))
 
 
 def fly_all(
     runs: Sequence[Scenario],
+    believed: Believed = PLAIN,
     stopped: Callable[[], bool] = lambda: False,
     work: Callable[[Flight, Scenario], T] = fly,  # type: ignore[assignment]
 ) -> Iterator[tuple[Scenario, T | Verdict]]:
     """Fly runs of one machine in the order in which they branch off, each with its outcome."""
-    warm_up()
-    flight = Flight(machine(runs[0].machine), programme(runs[0].machine))
+    warm_up(believed)
+    flight = Flight(runs[0].machine, believed)
     gc.collect()
     gc.freeze()
     places = sorted(((_place(flight, run), number) for number, run in enumerate(runs)))
