@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +16,7 @@ from maglev_controller.regulator import MeasurementFault, Regulator
 from maglev_controller.step.arrays import ControlArrays, Currents, Reading, Reference
 from maglev_controller.step.learning import NO_LEARNING, LearningArrays, learn, look_ahead
 from maglev_controller.step.sample import FIRST_FAULT, control_step
-from maglev_model.axes import FloatArray
+from maglev_model.axes import PHI, FloatArray, Y
 from maglev_model.compiled import borrowing
 from maglev_model.compiled.records import Block
 from maglev_model.geometry import outputs_of_gaps
@@ -24,6 +26,8 @@ from maglev_plant.encoder import encode
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
 from maglev_study.references import References
+
+_AT_STOP = 1e-6  # of it [m, rad]
 
 
 class LawFault(RuntimeError):  # noqa: N818
@@ -70,14 +74,6 @@ class Run:
         return _outputs(self.own_length, self.radius)
 
 
-def _following(
-    learning: IterativeLearning | None, follows: NDArray[np.bool_] | None, n: int
-) -> NDArray[np.bool_]:
-    if learning is None:
-        return np.zeros(0, dtype=np.bool_)
-    return np.ones(n, dtype=np.bool_) if follows is None else follows
-
-
 def _outputs(length: FloatArray, radius: float) -> FloatArray:
     return outputs_of_gaps(length[:, :4], length[:, 4], length[:, 5], radius)
 
@@ -88,52 +84,6 @@ def _keep(row: FloatArray, values: FloatArray) -> None:
         row[i] = values[i]
 
 
-@borrowing
-def _loop(
-    control: ControlArrays,
-    block: Block,
-    position: FloatArray,
-    velocity: FloatArray,
-    acceleration: FloatArray,
-    state: FloatArray,
-    reading: FloatArray,
-    own: FloatArray,
-    current: FloatArray,
-    code: NDArray[np.int8],
-    delayed: bool,
-    learning: LearningArrays,
-    follows: NDArray[np.bool_],
-    answer: FloatArray,
-) -> int:
-    """All samples, or up to the first that the regulator refuses; returns how many went well."""
-    stage: StageArrays = block[0]
-    learns = follows.size > 0
-    for k in range(position.shape[0]):
-        _keep(state[k], stage.state)
-        encode(block)
-        _keep(reading[k], stage.reading)
-        _keep(own[k], stage.effects.sensor.own)
-        if learns:
-            look_ahead(learning, control, follows[k])
-        code[k] = control_step(
-            control,
-            Reading(stage.reading[:4], stage.reading[4], stage.reading[5]),
-            Reference(position[k], velocity[k], acceleration[k]),
-            Currents(answer[:4], answer[4:]),
-        )
-        if code[k] >= FIRST_FAULT:
-            return k
-        if learns:
-            learn(learning, control)
-        if delayed:
-            advance(block)
-        for i in range(8):
-            stage.command[i] = current[k, i] = answer[i]
-        if not delayed:
-            advance(block)
-    return int(position.shape[0])
-
-
 class _Rows(NamedTuple):
     """Where the samples of a run are written, (n, ...) each."""
 
@@ -142,6 +92,47 @@ class _Rows(NamedTuple):
     own: FloatArray
     current: FloatArray
     code: NDArray[np.int8]
+
+
+@borrowing
+def _loop(
+    control: ControlArrays,
+    block: Block,
+    references: References,
+    rows: _Rows,
+    delayed: bool,
+    learning: LearningArrays,
+    follows: NDArray[np.bool_],
+    answer: FloatArray,
+) -> int:
+    """All samples, or up to the first that the regulator refuses; returns how many went well."""
+    stage: StageArrays = block[0]
+    learns = follows.size > 0
+    position, velocity, acceleration = references
+    for k in range(position.shape[0]):
+        _keep(rows.state[k], stage.state)
+        encode(block)
+        _keep(rows.reading[k], stage.reading)
+        _keep(rows.own[k], stage.effects.sensor.own)
+        if learns:
+            look_ahead(learning, control, follows[k])
+        rows.code[k] = control_step(
+            control,
+            Reading(stage.reading[:4], stage.reading[4], stage.reading[5]),
+            Reference(position[k], velocity[k], acceleration[k]),
+            Currents(answer[:4], answer[4:]),
+        )
+        if rows.code[k] >= FIRST_FAULT:
+            return k
+        if learns:
+            learn(learning, control)
+        if delayed:
+            advance(block)
+        for i in range(8):
+            stage.command[i] = rows.current[k, i] = answer[i]
+        if not delayed:
+            advance(block)
+    return int(position.shape[0])
 
 
 def _asking_loop(
@@ -187,41 +178,71 @@ def run(
     :class:`MeasurementFault` when the regulator refuses one, :class:`LawFault` when a law of
     somebody else's fails: what nodes land upon.
     """
-    position, velocity, acceleration = (
-        np.ascontiguousarray(array, dtype=np.float64) for array in references
-    )
-    n = position.shape[0]
-    for name, array in zip(References._fields, (position, velocity, acceleration), strict=True):
+    references = References(*(np.ascontiguousarray(each, dtype=np.float64) for each in references))
+    n = len(references.position)
+    for name, array in references._asdict().items():
         if array.shape != (n, 5):
             raise ValueError(f'{name} must have shape ({n}, 5), not {array.shape}')
-    state, current = np.empty((n, 10)), np.empty((n, 8))
-    reading, own = np.empty((n, 6)), np.empty((n, 6))
-    code = np.zeros(n, dtype=np.int8)
-    arrays, rows = stage.arrays, _Rows(state, reading, own, current, code)
-    references = References(position, velocity, acceleration)
+    lengths, arrays = (n, 6), stage.arrays
+    rows = _Rows(
+        np.empty((n, 10)),
+        np.empty(lengths),
+        np.empty(lengths),
+        np.empty((n, 8)),
+        np.zeros(n, dtype=np.int8),
+    )
+    if follows is None:
+        follows = np.ones(n, dtype=np.bool_)
     if regulator.foreign is None:
         done = _loop(
             regulator.arrays,
             arrays.block,
-            *references,
-            rows.state,
-            rows.reading,
-            rows.own,
-            rows.current,
-            rows.code,
+            references,
+            rows,
             delayed,
             NO_LEARNING if learning is None else learning.arrays,
-            _following(learning, follows, n),
+            np.zeros(0, dtype=np.bool_) if learning is None else follows,
             np.zeros(8),
         )
         if done < n:
             gap, x, z = arrays.reading[:4], float(arrays.reading[4]), float(arrays.reading[5])
-            told = regulator.describe(int(code[done]), gap, x, z)
+            told = regulator.describe(int(rows.code[done]), gap, x, z)
             raise MeasurementFault(f'sample {done}: {told}')
     else:
         _asking_loop(regulator, arrays, references, rows, delayed)
+    state, reading, own, current, code = rows
     radius = stage.parameters.machine.radius
     return Run(state, reading, own, current[:, :4], current[:, 4:], code, radius)
+
+
+def regulator_at_start(parameters: ControllerParameters) -> Regulator:
+    """The regulator of a law, which begins anew: one for all its flights, which go one by one."""
+    regulator = _designed(parameters)
+    regulator.reset()
+    return regulator
+
+
+@functools.lru_cache(maxsize=8)
+def _designed(parameters: ControllerParameters) -> Regulator:
+    return Regulator(parameters)
+
+
+def at_stops(plant: PlantParameters) -> Callable[[FloatArray], NDArray[np.bool_]]:
+    """The function: true outputs (..., 5) [m, rad] to whether the platen meets a stop there (...).
+
+    Of the axes that are not locked.
+    """
+    machine, radius, free = plant.machine, plant.stop.seat_radius, ~np.array(plant.guide.locked)
+    lower = np.array(machine.lower_limit) + _AT_STOP
+    upper = np.array(machine.upper_limit) - _AT_STOP
+
+    def met(output: FloatArray) -> NDArray[np.bool_]:
+        gap, reach = output[..., Y], radius * np.abs(output[..., PHI:]).max(axis=-1)
+        seated = (gap - reach <= lower[Y]) | (gap + reach >= upper[Y])
+        beyond = free & ((output <= lower) | (output >= upper))
+        return np.asarray(seated | beyond.any(axis=-1))
+
+    return met
 
 
 def warm_up() -> None:

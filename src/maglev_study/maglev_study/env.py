@@ -28,6 +28,7 @@ from maglev_model.programs.optional import needed
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
 from maglev_study.arguments import a_table
+from maglev_study.closed_loop import at_stops
 from maglev_study.inverses import inverse_of
 from maglev_study.references import HOVER, References, held, joined, shaped
 
@@ -45,7 +46,6 @@ LARGEST = 100.0
 """What an observation is at most."""
 
 _REACH = np.array([0.004, 0.03, 0.03, 0.001, 0.006])  # of set-points drawn, from HOVER [m, rad]
-_AT_STOP = 1e-6  # [m, rad]
 
 Course = Callable[[np.random.Generator, float, float], References]
 """Draws the reference of an episode: from a generator, its duration [s] and the sample time [s]."""
@@ -118,8 +118,7 @@ class StageEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._direct, self._quadrature = np.zeros(4), np.zeros(4)
         self.action_space = Box(-1.0, 1.0, (8 if self._by_currents else 5,), np.float32)
         self.observation_space = Box(-LARGEST, LARGEST, (25,), np.float32)
-        machine = self._plant.machine
-        self._lower, self._upper = np.array(machine.lower_limit), np.array(machine.upper_limit)
+        self._at_stop = at_stops(self._plant)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -155,7 +154,7 @@ class StageEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             close_with_input(*arrays, ACCELERATION * asked, direct, quadrature)
         self._stage.write(direct, quadrature)
         self._sample += 1
-        lost = not self._measure() or self._at_stop()
+        lost = not self._measure() or bool(self._at_stop(self._stage.state[::2]))
         reward = 0.0 if lost else self._reward(asked)
         truncated = not lost and self._sample >= self._left
         return self._observation(), reward, lost, truncated, self._info()
@@ -175,13 +174,6 @@ class StageEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             *self._regulator.arrays, gap, x, z, position, velocity, acceleration, self._told
         )
         return code < FIRST_FAULT
-
-    def _at_stop(self) -> bool:
-        position, stop = self._stage.state[::2], self._plant.stop.seat_radius
-        reach = stop * float(np.abs(position[3:]).max())
-        low, high = self._lower + _AT_STOP, self._upper - _AT_STOP
-        seated = position[0] - reach <= low[0] or position[0] + reach >= high[0]
-        return bool(seated or np.any(position <= low) or np.any(position >= high))
 
     def _error(self) -> FloatArray:
         return np.asarray(self._told[0] - self._told[2])

@@ -102,6 +102,15 @@ class StageAt:
             slopes(lambda current: self.rates(0.0, self.state, current), there),
         )
 
+    def lagging_slopes(self, flowing: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
+        """The same by asked currents; with a lag, those that flow are eight more states."""
+        by_state, by_current = self.slopes(flowing)
+        if not self.lag:
+            return by_state, by_current
+        lag = self.lag * np.eye(8)
+        by_state = np.block([[by_state, by_current], [np.zeros((8, 10)), -lag]])
+        return by_state, np.vstack((np.zeros((10, 8)), lag))
+
 
 def slopes(function: Callable[[FloatArray], FloatArray], at: FloatArray) -> FloatArray:
     """Derivatives (m, n) of a function of (n,) that gives (m,)."""
@@ -192,16 +201,11 @@ def linearise(
             states=loop.names,
             name=f'loop of {axis}',
         )
-    by_state, by_current = stage.slopes()
-    read = np.eye(10)[::2]
-    if stage.lag:
-        by_state = np.block([[by_state, by_current], [np.zeros((8, 10)), -stage.lag * np.eye(8)]])
-        by_current = np.vstack((np.zeros((10, 8)), stage.lag * np.eye(8)))
-        read = np.hstack((read, np.zeros((5, 8))))
+    by_state, by_current = stage.lagging_slopes()
     return control.ss(
         by_state,
         by_current,
-        read,
+        np.eye(10, len(by_state))[::2],
         np.zeros((5, 8)),
         inputs=list(CURRENTS),
         outputs=list(AXES),

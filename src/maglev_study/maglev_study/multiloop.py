@@ -206,14 +206,8 @@ def _plant(
     stage: StageAt, flowing: FloatArray, read: FloatArray, period: float, delay: int
 ) -> Part:
     """Currents, held over a sample and ``delay`` samples late, to readings."""
-    by_state, by_current = stage.slopes(flowing)
-    if stage.lag:
-        lag = stage.lag * np.eye(8)
-        by_state = np.block([[by_state, by_current], [np.zeros((8, 10)), -lag]])
-        by_current = np.vstack((np.zeros((10, 8)), lag))
-    state, driven = discretise(by_state, by_current, period)
-    size = len(state)
-    output = np.zeros((6, size))
+    state, driven = discretise(*stage.lagging_slopes(flowing), period)
+    output = np.zeros((6, len(state)))
     output[:, :10:2] = read
     for _ in range(delay):
         state = np.block([[state, driven], [np.zeros((8, len(state) + 8))]])

@@ -8,7 +8,6 @@ the rows without those to be foretold and on all, and prints what each foretells
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -16,15 +15,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from maglev_controller.parameters import ControllerParameters
-from maglev_controller.regulator import MeasurementFault, Regulator
+from maglev_controller.regulator import MeasurementFault
 from maglev_model.axes import AXES, THETA, FloatArray
 from maglev_model.paper import TRACKING
-from maglev_model.parameters import from_yaml, replace
+from maglev_model.parameters import replace
 from maglev_plant.parameters import PlantParameters
-from maglev_plant.simulation import SimulatedStage
-from maglev_study.closed_loop import run
 from maglev_study.references import HOVER, References, ellipse, held, joined
+from maglev_study.rough_flights import flown, laws, plant_of
 
 PARAMS = Path(__file__).resolve().parents[3] / 'params'
 PERIOD = 1e-3
@@ -102,26 +99,16 @@ CANDIDATES = (
 )
 
 
-@functools.cache
-def _law() -> Regulator:
-    names = ('controller', 'paper', 'paper_exact')
-    files = [PARAMS / f'{name}.yaml' for name in names]
-    return Regulator(from_yaml(ControllerParameters, 'controller', *files))
-
-
 def _true(plant: PlantParameters, references: References) -> FloatArray:
-    regulator = _law()
-    regulator.reset()
     try:
-        return run(regulator, SimulatedStage(plant), references).output
+        return flown(plant, laws(PARAMS)["paper's law"], references).output
     except MeasurementFault:
         return np.full(references.position.shape, 1.0)
 
 
 def figures(overrides: Mapping[str, object]) -> dict[str, float]:
     """The rows of :data:`PUBLISHED` as the paper's law has them on a plant."""
-    plant = from_yaml(PlantParameters, 'plant', PARAMS / 'machine.yaml', PARAMS / 'benchmark.yaml')
-    plant = replace(plant, {'initial.position': tuple(HOVER), **overrides})
+    plant = replace(plant_of(PARAMS), overrides)
     found: dict[str, float] = {}
     for scenario, title in _TITLES.items():
         theta = 0.010 if scenario == 'ellipse_4dof' else 0.0

@@ -7,20 +7,19 @@ An internal model hides on an ellipse what repeats with position; slow scans and
 from __future__ import annotations
 
 import dataclasses
-import functools
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
 
 from maglev_controller.parameters import ControllerParameters
-from maglev_controller.regulator import MeasurementFault, Regulator
+from maglev_controller.regulator import MeasurementFault
 from maglev_model.axes import FloatArray
 from maglev_model.parameters import from_yaml, replace
 from maglev_monitor.metrics.repeatability import Repeatability, repeatability
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
-from maglev_study.closed_loop import Run, run
+from maglev_study.closed_loop import Run, regulator_at_start, run
 from maglev_study.references import HOVER, References, ellipse, held, joined, scan, shaped
 
 THETA = 0.010
@@ -119,11 +118,8 @@ def positioning(
     place = HOVER + np.outer(course, _SPAN * (np.arange(5) == axis))
     starts = np.vstack([HOVER, place[:-1]])
     parts = [shaped(a, b, 0.5, 1.0, period) for a, b in zip(starts, place, strict=True)]
-    stage = SimulatedStage(replace(plant, {'initial.position': tuple(HOVER)}))
-    regulator = _designed(controller)
-    regulator.reset()
     try:
-        outcome = run(regulator, stage, joined(*parts))
+        outcome = flown(plant, controller, joined(*parts))
     except MeasurementFault:
         return None
     n, tail = round(1.5 / period), round(0.1 / period)
@@ -135,27 +131,21 @@ def positioning(
     return found
 
 
-@functools.lru_cache(maxsize=8)
-def _designed(parameters: ControllerParameters) -> Regulator:
-    return Regulator(parameters)
+def flown(plant: PlantParameters, controller: ControllerParameters, references: References) -> Run:
+    """A law on a plant, begun at rest at 25 mm; MeasurementFault where the platen is given up."""
+    stage = SimulatedStage(replace(plant, {'initial.position': tuple(HOVER)}))
+    return run(regulator_at_start(controller), stage, references)
 
 
 def fly_rough(
     plant: PlantParameters, controller: ControllerParameters, experiment: Experiment
 ) -> Outcome:
     """One flight of a law on a plant, begun at rest at 25 mm."""
-    stage = SimulatedStage(replace(plant, {'initial.position': tuple(HOVER)}))
-    regulator = _designed(controller)
-    regulator.reset()
     try:
-        outcome = run(regulator, stage, experiment.references)
+        outcome = flown(plant, controller, experiment.references)
     except MeasurementFault as fault:
         return Outcome(experiment.name, lost=str(fault))
-    return judged(experiment, outcome, plant.sample_time)
-
-
-def judged(experiment: Experiment, outcome: Run, period: float) -> Outcome:
-    """What a run of an experiment amounts to."""
+    period = plant.sample_time
     n = round(experiment.measured / period)
     wanted = experiment.references.position
     sources = (outcome.output, outcome.own, outcome.measured)

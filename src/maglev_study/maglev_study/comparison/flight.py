@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from maglev_controller.parameters import ControllerParameters
-from maglev_controller.regulator import MeasurementFault, Regulator
-from maglev_model.axes import PHI, FloatArray, Y
+from maglev_controller.regulator import MeasurementFault
+from maglev_model.axes import FloatArray
 from maglev_plant.simulation import SimulatedStage
-from maglev_study.closed_loop import LawFault, Run, run
+from maglev_study.closed_loop import LawFault, Run, at_stops, regulator_at_start, run
 from maglev_study.comparison.contestants import Contestant
 from maglev_study.references import HOVER, References, held, shaped
 
@@ -22,13 +20,6 @@ SETTLED = 1e-4
 
 ENCODER = (1e-5, 1e-5, 1e-5, 2e-5, 2e-5)
 """Resolution of the encoders [m, rad], the paper's t_enc."""
-
-_AT_STOP = 1e-6
-
-
-@functools.lru_cache(maxsize=8)
-def _designed(parameters: ControllerParameters) -> Regulator:
-    return Regulator(parameters)
 
 
 class Step(NamedTuple):
@@ -48,14 +39,9 @@ class Flight:
         """``overrides`` are the stage's, dots written as ``__``."""
         parameters = contestant.stage(initial__position=tuple(HOVER), **overrides)
         self.period = parameters.sample_time
-        self.regulator = _designed(contestant.controller)
-        self.regulator.reset()
+        self.regulator = regulator_at_start(contestant.controller)
         self.stage = SimulatedStage(parameters)
-        machine = parameters.machine
-        free = ~np.array(parameters.guide.locked)
-        self._free = free
-        self._lower = np.array(machine.lower_limit)[free] + _AT_STOP
-        self._upper = np.array(machine.upper_limit)[free] - _AT_STOP
+        self._at_stop = at_stops(parameters)
         self.seat_radius = parameters.stop.seat_radius
         self.lost = ''  # how the platen was, where it was
 
@@ -71,13 +57,6 @@ class Flight:
             self.lost = f'sample {met[0]}: the platen meets a stop'
             return None
         return outcome
-
-    def _at_stop(self, output: FloatArray) -> NDArray[np.bool_]:
-        reach = self.seat_radius * np.abs(output[:, PHI:]).max(axis=1)
-        free = output[:, self._free]
-        seated = (output[:, Y] - reach <= self._lower[Y]) | (output[:, Y] + reach >= self._upper[Y])
-        beyond = (free <= self._lower) | (free >= self._upper)
-        return np.asarray(seated | beyond.any(axis=1))
 
     def approach(self, goal: FloatArray, time: float = 4.0, hold: float = 5.0) -> bool:
         """Go from 25 mm to a set-point (5,) in ``time`` [s] and hold it; false when that fails."""
