@@ -107,8 +107,7 @@ def rows(runs: Sequence[Run]) -> Iterator[tuple[str, ...]]:
         yield (title,)
         results = [found.get((case, 'steps')) for case in cases]
         for step in STEPS:
-            ends = (angle_or_length(step.axis, value) for value in (step.start, step.target))
-            start, target = ends
+            start, target = (angle_or_length(step.axis, end) for end in (step.start, step.target))
             published_step = f'{step.overshoot}, {step.settling_time}, {step.encoder_time}'
             yield (
                 f'{step.axis}, {start.split()[0]} → {target}',
@@ -171,7 +170,8 @@ def paper_tables(arguments: Sequence[str] | None = None) -> int:
     out = options.out or options.folder
     text = markdown(runs)
     try:
-        _write(out, runs, text)
+        write_whole(out / 'paper_tables.md', text)
+        write_whole(out / 'paper_tables.html', render(runs))
     except OSError as error:
         return _error(f"cannot write to '{out}': {error.strerror}")
     print(text)
@@ -208,11 +208,6 @@ def _parser() -> argparse.ArgumentParser:
 def _error(message: str) -> int:
     print(f'paper_tables: error: {message}', file=sys.stderr)
     return NOTHING
-
-
-def _write(out: Path, runs: Sequence[Run], text: str) -> None:
-    write_whole(out / 'paper_tables.md', text)
-    write_whole(out / 'paper_tables.html', render(runs))
 
 
 def _failure(result: Mapping[str, Any]) -> str:

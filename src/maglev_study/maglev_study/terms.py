@@ -13,14 +13,10 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from maglev_model.axes import FloatArray
 from maglev_model.machine import Machine
 from maglev_model.motor import force_coefficients
 from maglev_model.platen import affine_terms
-
-FloatArray = NDArray[np.float64]
-
-INPUTS = ('v_y', 'v_phi', 'v_theta')
-"""The inputs of (8), in the order of the columns of the matrix in (12)."""
 
 POWERS = {
     'a': (
@@ -76,20 +72,19 @@ class Terms:
 
     def __getitem__(self, equation: str) -> FloatArray:
         """The terms of the equation ``a``, ``b`` or ``c``."""
-        return {'a': self.a, 'b': self.b, 'c': self.c}[equation]
+        found: FloatArray = getattr(self, equation)
+        return found
 
 
-def terms(
-    machine: Machine, y: float, phi: float, theta: float, *, u_x: float = 0.0, u_z: float = 0.0
-) -> Terms:
-    """The terms of (9) at one air gap [m], tilt [rad] and quadrature currents [A]."""
+def terms(machine: Machine, y: float, phi: float, theta: float) -> Terms:
+    """The terms of (9) at one air gap [m] and tilt [rad], with u_x = u_z = 0."""
     found = Terms(np.empty(9), np.empty(6), np.empty(6))
-    affine_terms(machine, y, phi, theta, u_x, u_z, found.a, found.b, found.c)
+    affine_terms(machine, y, phi, theta, 0.0, 0.0, found.a, found.b, found.c)
     return found
 
 
 def largest_terms(machine: Machine, gaps: ArrayLike, tilts: TiltRange) -> Terms:
-    """The largest magnitudes over the tilts, for each air gap, with u_x = u_z = 0: (10).
+    """The largest magnitudes over the tilts, for each air gap: (10).
 
     ``gaps`` [m], shape (n,); a is shaped (n, 9), b and c (n, 6), in the units of
     :func:`maglev_model.platen.affine_terms`.
@@ -104,7 +99,7 @@ def largest_terms(machine: Machine, gaps: ArrayLike, tilts: TiltRange) -> Terms:
 def input_matrix(
     machine: Machine, y: float, phi: float, theta: float, *, at_motors: bool = False
 ) -> FloatArray:
-    """The matrix that (12) inverts: rows y, phi, theta, columns :data:`INPUTS`, shape (3, 3).
+    """The matrix that (12) inverts: rows y, phi, theta, columns v_y, v_phi, v_theta, shape (3, 3).
 
     ``at_motors`` gives the rows of phi and theta as accelerations at the motors (times r), so that
     all entries are in m/s² per ampere and a condition number does not depend on units.

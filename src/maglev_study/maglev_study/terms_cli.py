@@ -10,11 +10,11 @@ from typing import NoReturn
 
 import numpy as np
 
+from maglev_model.axes import FloatArray
 from maglev_model.machine import Machine, MachineParameters, machine_constants
 from maglev_model.programs.command import leave_with
 from maglev_study.terms import (
     POWERS,
-    FloatArray,
     Terms,
     TiltRange,
     condition_range,
@@ -45,28 +45,25 @@ def run(arguments: Sequence[str] | None = None) -> int:
     tilts = TiltRange(phi=parameters.phi_max, theta=parameters.theta_max)
     low, high = options.gap
     if not _LEAST_GAP <= low < high <= 0.05:
-        print(
-            f'terms: error: --gap is {low:g} {high:g}, it must be two air gaps [m], the smaller'
-            f' first, from {_LEAST_GAP:g} to 0.05',
-            file=sys.stderr,
+        return _refuse(
+            f'--gap is {low:g} {high:g}, it must be two air gaps [m], the smaller first, from'
+            f' {_LEAST_GAP:g} to 0.05'
         )
-        return 2
     try:
         for line in report(machine, np.linspace(low, high, _ROWS), tilts):
             print(line)
         path = _draw(machine, np.linspace(low, high, _POINTS), tilts, options)
     except ValueError as error:
-        print(f'terms: error: {error}: choose another --gap', file=sys.stderr)
-        return 2
+        return _refuse(f'{error}: choose another --gap')
     except OSError as error:
-        print(
-            f"terms: error: cannot write to '{options.out}': {error.strerror}: choose another"
-            ' --out',
-            file=sys.stderr,
-        )
-        return 2
+        return _refuse(f"cannot write to '{options.out}': {error.strerror}: choose another --out")
     print(f'\nfigure: {path}')
     return 0
+
+
+def _refuse(reason: str) -> int:
+    print(f'terms: error: {reason}', file=sys.stderr)
+    return 2
 
 
 def report(machine: Machine, gaps: FloatArray, tilts: TiltRange) -> Iterator[str]:

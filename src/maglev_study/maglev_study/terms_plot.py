@@ -2,36 +2,17 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
-import matplotlib
-
-matplotlib.use('Agg')
-
-import numpy as np
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
+from maglev_model.axes import FloatArray
+from maglev_monitor.metrics.result_file import whole
+from maglev_monitor.report.drawing import STYLE
 from maglev_study.terms import POWERS, Terms
 
-FloatArray = NDArray[np.float64]
-
-_STYLE = {
-    'font.size': 9.0,
-    'axes.grid': True,
-    'axes.axisbelow': True,
-    'axes.spines.top': False,
-    'axes.spines.right': False,
-    'grid.color': '#e6e6e6',
-    'axes.titlesize': 9.5,
-    'axes.titlelocation': 'left',
-    'legend.frameon': False,
-    'legend.fontsize': 8.0,
-    'figure.constrained_layout.use': True,
-    'svg.hashsalt': 'terms',
-}
+_STYLE = {**STYLE, 'axes.titleweight': 'normal', 'svg.hashsalt': 'terms'}
 _EQUATIONS = {'a': 'air gap', 'b': 'tilt φ', 'c': 'tilt θ'}
 _KEPT, _DROPPED = '-', '--'
 
@@ -54,12 +35,10 @@ def draw(gaps: FloatArray, largest: Terms, path: Path) -> None:
         for row in panels:
             row[0].set_ylabel('m/s² per A, A²')
             row[1].set_ylabel('rad/s² per A, A²')
-        temporary = path.with_name(f'.{path.name}.tmp')
         try:
-            figure.savefig(temporary, format=path.suffix[1:], dpi=130, metadata={})
-            os.replace(temporary, path)
+            with whole(path) as partial:
+                figure.savefig(partial, format=path.suffix[1:], dpi=130, metadata={})
         finally:
-            temporary.unlink(missing_ok=True)
             plt.close(figure)
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from maglev_model.programs.optional import needed
 from maglev_model.programs.progress import Progress
 from maglev_monitor.bag.columns import Table, table
+from maglev_monitor.metrics.result_file import whole
 
 _ROWS = 10_000  # of text that is made at once
 
@@ -45,12 +46,8 @@ def write(found: Table, path: Path, form: str, progress: Progress | None = None)
     """
     if path.exists() and not path.is_file():
         raise OSError(errno.EINVAL, 'it is there and is no file')
-    partial = path.with_name(path.name + '.tmp')
-    try:
+    with whole(path) as partial:
         FORMATS[form](found, partial, progress)
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
     if form != 'csv':
         return [path]
     described = path.with_name(f'{path.stem}_columns.csv')

@@ -17,6 +17,7 @@ from maglev_monitor.bag.chunk_file import ChunkFile
 from maglev_monitor.bag.definitions import Definitions, FindMessages
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.rosbag2_metadata import Span, Topic, as_yaml, bag_information, offered_qos
+from maglev_monitor.metrics.result_file import write_whole
 
 _CHUNK_BYTES = 1 << 19
 _CHUNKS_IN_FILE = 1 << 11  # whose index the writer holds, half a kilobyte each; 11 min of a run
@@ -154,10 +155,8 @@ class BagWriter:
         self._mcap.finish()  # type: ignore[no-untyped-call]
 
     def _write_metadata(self) -> None:
-        temporary = self.path / 'metadata.yaml.tmp'
         text = as_yaml({'rosbag2_bagfile_information': self._information()}) + '\n'
-        temporary.write_text(text, encoding='utf-8')
-        os.replace(temporary, self.path / 'metadata.yaml')
+        write_whole(self.path / 'metadata.yaml', text)
 
     def _information(self) -> dict[str, Any]:
         return bag_information(self._files, list(self._topics.values()), self._custom)

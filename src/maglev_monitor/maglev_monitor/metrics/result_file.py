@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +21,16 @@ def write_metrics(path: Path, result: Mapping[str, Any]) -> None:
 def write_whole(path: Path, text: str) -> None:
     """Write a file, in a folder that may be new, in one go: all of it or none. Raises OSError."""
     path.parent.mkdir(parents=True, exist_ok=True)
+    with whole(path) as partial:
+        partial.write_text(text, encoding='utf-8')
+
+
+@contextlib.contextmanager
+def whole(path: Path) -> Iterator[Path]:
+    """Where to write a file that takes its place when all of it is there."""
     partial = path.with_name(path.name + '.tmp')
     try:
-        partial.write_text(text, encoding='utf-8')
+        yield partial
         partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)

@@ -109,7 +109,13 @@ def line(
     options = {'line_width': 1.1, **options}
     drawn = panel.line('x', 'y', source=source, color=colour, legend_label=name, **options)
     tips = [(name, '@y{0.[0000]}'), (panel.xaxis[0].axis_label, '@x{0.[000]}')]
-    panel.add_tools(HoverTool(renderers=[drawn], tooltips=tips, mode='vline', visible=False))
+    hover(panel, drawn, tips, mode='vline')
+
+
+def hover(panel: figure, drawn: Any, tips: Sequence[tuple[str, str]], **options: Any) -> None:
+    """Let what is drawn say ``tips`` where the pointer is."""
+    tool = HoverTool(renderers=[drawn], tooltips=list(tips), visible=False, **options)
+    panel.add_tools(tool)
 
 
 def envelope(

@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import LogNorm
+from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
@@ -23,7 +22,6 @@ def draw_regions(regions: Mapping[str, list[Region]], path: Path) -> None:
     """One column for each law, one row for each axis; the format is by the path's suffix."""
     rows = max(len(found) for found in regions.values())
     figure = Figure(figsize=(3.0 * len(regions) + 1.5, 3.2 * rows + 0.6), layout='constrained')
-    FigureCanvasAgg(figure)
     panels = figure.subplots(rows, len(regions), squeeze=False)
     mesh: Any = None
     for column, (name, found) in enumerate(regions.items()):
@@ -51,21 +49,14 @@ def _panel(axes: Any, region: Region) -> Any:
     columns, rows = np.arange(region.size.size), region.gap * 1e3
     for mark, colour in ((LOST, _LOST), (NOT_SETTLED, _UNSETTLED)):
         here = np.where(settling == mark, 1.0, np.nan)
-        axes.pcolormesh(columns, rows, here, cmap=_flat(colour), shading='nearest')
+        axes.pcolormesh(columns, rows, here, cmap=ListedColormap([colour]), shading='nearest')
     settled = np.where(np.isfinite(settling) & (settling >= 0.0), settling, np.nan)
     mesh = None
     if np.isfinite(settled).any():
-        shown = np.clip(settled, *_SPAN)
-        norm = LogNorm(*_SPAN)
+        shown, norm = np.clip(settled, *_SPAN), LogNorm(*_SPAN)
         mesh = axes.pcolormesh(columns, rows, shown, cmap='viridis_r', norm=norm, shading='nearest')
     ticks = columns[:: max(1, len(columns) // 7)]
     axes.set_xticks(ticks, [f'{1e3 * region.size[tick]:g}' for tick in ticks])
     axes.set_xlabel(_NAMES[region.axis])
     axes.set_ylabel('air gap at the start [mm]')
     return mesh
-
-
-def _flat(colour: str) -> Any:
-    from matplotlib.colors import ListedColormap
-
-    return ListedColormap([colour])

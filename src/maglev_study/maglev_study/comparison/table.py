@@ -58,12 +58,7 @@ def to_json(
         'facts': facts,
         'experiments': {
             law: [
-                {
-                    'section': row.section,
-                    'title': row.title,
-                    'text': row.text,
-                    'values': [_finite(value) for value in row.values],
-                }
+                {**vars(row), 'values': [v if math.isfinite(v) else None for v in row.values]}
                 for row in found
             ]
             for law, found in rows.items()
@@ -82,10 +77,6 @@ def to_json(
         },
     }
     return json.dumps(content, indent=1, allow_nan=False)
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def _outcome(value: float) -> float | str | None:

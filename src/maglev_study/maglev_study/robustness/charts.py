@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from bokeh.models import ColumnDataSource, FactorRange, HoverTool
+from bokeh.models import ColumnDataSource, FactorRange
 from bokeh.plotting import figure
 
 from maglev_model.axes import AXES, FloatArray
@@ -14,6 +14,7 @@ from maglev_monitor.report.chart import (
     COLOURS,
     Chart,
     Panels,
+    hover,
     legend,
     line,
     mark,
@@ -129,7 +130,7 @@ def _of_step(group: Group, name: str) -> Iterator[_Span]:
 
 
 def _bars(
-    title: str, unit: str, spans: Sequence[_Span], colours: Mapping[str, str], **options: object
+    title: str, unit: str, spans: Sequence[_Span], colours: Mapping[str, str], **options: Any
 ) -> figure:
     several = len({span.law for span in spans}) > 1
     rows = [(span.name, span.law) if several else span.name for span in spans]
@@ -147,10 +148,7 @@ def _bars(
             'colour': [colours[span.law] for span in spans],
         }
     )
-    places = list(dict.fromkeys(rows))[::-1]
-    panel = Panels(unit).panel(
-        title, '', y_range=FactorRange(*places), height=90 + 18 * len(places), **options
-    )
+    panel = _row_panel(title, unit, list(dict.fromkeys(rows))[::-1], **options)
     panel.segment('least', 'row', 'most', 'row', source=source, color='colour')
     bars = panel.hbar('row', 0.6, 'high', 'low', source=source, color='colour', fill_alpha=0.35)
     panel.scatter('middle', 'row', source=source, marker='dash', angle=np.pi / 2, color='colour')
@@ -162,8 +160,14 @@ def _bars(
         panel.scatter(list(x), list(row), marker='x', size=9, color=_PAPER, line_width=2)
     tips = [('', '@name'), ('5 / 50 / 95 %', '@low{0.00} / @middle{0.00} / @high{0.00}')]
     tips += [('from, to', '@least{0.00}, @most{0.00}'), ('nominal', '@nominal{0.00}')]
-    panel.add_tools(HoverTool(renderers=[bars], tooltips=tips, visible=False))
+    hover(panel, bars, tips)
     return panel
+
+
+def _row_panel(title: str, unit: str, rows: Sequence[Any], **options: Any) -> figure:
+    """A panel with a row for each name, from below."""
+    height = 90 + 18 * len(rows)
+    return Panels(unit).panel(title, '', y_range=FactorRange(*rows), height=height, **options)
 
 
 def tornado(found: Sequence[tuple[Group, Sequence[tuple[str, float]]]]) -> list[Chart]:
@@ -179,19 +183,13 @@ def tornado(found: Sequence[tuple[Group, Sequence[tuple[str, float]]]]) -> list[
         if not shown:
             continue
         names = [name for name, _ in shown]
-        panel = Panels('rank correlation').panel(
-            f'{group.experiment.name}, {group.law}',
-            '',
-            y_range=FactorRange(*names),
-            height=90 + 18 * len(names),
-        )
+        title = f'{group.experiment.name}, {group.law}'
+        panel = _row_panel(title, 'rank correlation', names)
         source = ColumnDataSource({'name': names, 'value': [value for _, value in shown]})
         bars = panel.hbar('name', 0.6, 'value', 0.0, source=source, color=COLOURS[0])
         bound = _BY_CHANCE / np.sqrt(len(group.drawn) - 1)
         for value in (-bound, bound):
             mark(panel, value, _NOMINAL)
-        panel.add_tools(
-            HoverTool(renderers=[bars], tooltips=[('@name', '@value{0.00}')], visible=False)
-        )
+        hover(panel, bars, [('@name', '@value{0.00}')])
         panels.append(panel)
     return [Chart('Which parameter matters', caption, panels)] if panels else []

@@ -6,10 +6,11 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from bokeh.models import ColumnDataSource, HoverTool
+from bokeh.models import ColumnDataSource
 from scipy.stats import spearmanr
 
-from maglev_monitor.report.chart import COLOURS, Chart, Panels, legend, line
+from maglev_monitor.report.chart import COLOURS, Chart, Panels, hover, legend, line
+from maglev_study.multiloop import Guarantee
 from maglev_study.robustness.guarantee import DELAYS, SETS, Found, Guarantees, Place
 from maglev_study.robustness.outcome import Group
 
@@ -35,21 +36,14 @@ def rows(found: Sequence[Guarantees]) -> list[list[str]]:
     for one in found:
         for delay in DELAYS:
             worst = one.worst(delay)
-            told.append(
-                [
-                    one.law,
-                    _LATE[delay],
-                    worst.place.text(),
-                    _text(worst.current.gain, worst.current.phase),
-                    _text(worst.reading.gain, worst.reading.phase),
-                    f'±{one.unstable:.1f} dB' if delay == 0 else '',
-                ]
-            )
+            guaranteed = map(_text, (worst.current, worst.reading))
+            unstable = f'±{one.unstable:.1f} dB' if delay == 0 else ''
+            told.append([one.law, _LATE[delay], worst.place.text(), *guaranteed, unstable])
     return told
 
 
-def _text(gain: float, phase: float) -> str:
-    return f'±{gain:.1f} dB or ±{phase:.0f}°' if gain > 0.0 else 'unstable'
+def _text(one: Guarantee) -> str:
+    return f'±{one.gain:.1f} dB or ±{one.phase:.0f}°' if one.gain > 0.0 else 'unstable'
 
 
 def words(found: Sequence[Guarantees], flown: Sequence[Group]) -> list[str]:
@@ -112,7 +106,7 @@ def charts(found: Sequence[Guarantees], flown: Sequence[Group]) -> list[Chart]:
         )
         points = panel.scatter('x', 'y', source=source, color=colour, size=6)
         tips = [('', '@name'), ('guaranteed', '@x{0.00} dB'), ('error', '@y{0.00}')]
-        panel.add_tools(HoverTool(renderers=[points], tooltips=tips, visible=False))
+        hover(panel, points, tips)
     caption = 'Each machine that was not lost: its guarantee, and the error it flew with.'
     return [*made, Chart('Guarantees and flights', caption, [panel])]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 
@@ -50,6 +51,7 @@ def render(
 
     found = groups(campaign)
     laws = [one.name for one in campaign.plan.contestants]
+    shares = [f'{100 * share:g} %' for share in SHARES]
     drawn = {law: drawn_parameters(campaign, law) for law in laws}
     charts = [
         *fans(found),
@@ -70,7 +72,7 @@ def render(
         *_margins(guaranteed, unknown, found),
         '<h2>Figures</h2>',
         html_table(
-            ['law', 'experiment', 'figure', 'nominal', *_shares(), 'worst', 'the paper'],
+            ['law', 'experiment', 'figure', 'nominal', *shares, 'worst', 'the paper'],
             [row for one in found for row in figures(one)],
         ),
         *drawn_charts([*charts, *margins_page.charts(guaranteed, found)]),
@@ -147,31 +149,11 @@ def figures(group: Group) -> list[list[str]]:
             )
     step = group.experiment.step
     if step is not None:
-        said = next(
-            (
-                one
-                for one in STEPS
-                if (one.axis, one.start, one.target) == (AXES[step.axis], step.start, step.end)
-            ),
-            None,
-        )
-        for name, word, unit in (('overshoot', 'overshoot', '%'), ('settling', 'settling', 's')):
-            paper_text = (
-                ''
-                if said is None
-                else said.overshoot
-                if name == 'overshoot'
-                else said.settling_time
-            )
-            rows.append(
-                _row(
-                    group,
-                    f'{word} [{unit}]',
-                    getattr(group.nominal, name),
-                    group.figures(name),
-                    paper_text,
-                )
-            )
+        said = {one[:3]: (one.overshoot, one.settling_time) for one in STEPS}
+        papers = said.get((AXES[step.axis], step.start, step.end), ('', ''))
+        for name, unit, told in zip(('overshoot', 'settling'), ('%', 's'), papers, strict=True):
+            values, nominal = group.figures(name), getattr(group.nominal, name)
+            rows.append(_row(group, f'{name} [{unit}]', nominal, values, told))
     return rows
 
 
@@ -180,26 +162,14 @@ def _row(group: Group, what: str, nominal: float, values: FloatArray, paper: str
     return [group.law, group.experiment.name, what, *(f'{one:.3g}' for one in shown), paper]
 
 
-def _shares() -> list[str]:
-    return [f'{100 * share:g} %' for share in SHARES]
-
-
 def _worst_rows(found: Sequence[Group], replays: Mapping[str, str]) -> list[list[str]]:
     rows = []
     for law, replay in replays.items():
         one = worst(found, law)
         if one is not None:
             score = 'lost' if math.isinf(one.score) else f'{one.score:.2f}'
-            rows.append(
-                [
-                    law,
-                    str(one.machine),
-                    one.experiment,
-                    score,
-                    one.what,
-                    f'{replay} {one.machine}',
-                ]
-            )
+            machine = str(one.machine)
+            rows.append([law, machine, one.experiment, score, one.what, f'{replay} {machine}'])
     return rows
 
 
@@ -218,14 +188,7 @@ def _lost(found: Sequence[Group]) -> list[str]:
 
 
 def _draws(campaign: Campaign) -> list[list[str]]:
-    return [
-        [
-            one.name,
-            one.by,
-            one.of.distribution,
-            f'{one.of.centre:g}',
-            f'{one.of.width:g}',
-            one.of.source,
-        ]
-        for one in campaign.plan.draws
-    ]
+    rows = []
+    for by, name, (kind, centre, width, source) in map(dataclasses.astuple, campaign.plan.draws):
+        rows.append([name, by, kind, f'{centre:g}', f'{width:g}', source])
+    return rows
