@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
-from maglev_model.axes import AXES
+from maglev_model.axes import AXES, FloatArray
 from maglev_model.paper import STEPS, TRACKING, PublishedStep
 from maglev_monitor.bag.analysis import Analysis
 from maglev_monitor.metrics.curves import StepCurves
@@ -21,7 +21,6 @@ from maglev_monitor.report.drawing import (
     REFERENCE,
     SECOND,
     STYLE,
-    FloatArray,
     Plot,
     column,
     envelope,

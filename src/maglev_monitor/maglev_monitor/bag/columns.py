@@ -19,7 +19,7 @@ from maglev_model.programs.progress import Progress
 from maglev_monitor.bag.analysis import run_parameters
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.reader import Bag
-from maglev_monitor.metrics.decoding import Records, stage_period
+from maglev_monitor.metrics.decoding import Records, joined, stage_period
 
 NONE = -1
 """What a column of whole numbers holds at a sample whose message is missing; others hold NaN."""
@@ -116,7 +116,8 @@ def table(path: str | Path, progress: Progress | None = None) -> Table:
     measured = records.get('measurement')
     stage = None if measured is None else stage_period(measured)
     period = stage or run.metrics.sample_time
-    named = {name: (unit, text) for name, unit, text in FIRST}
+    units = {name: unit for name, unit, _ in FIRST}
+    texts = {name: text for name, _, text in FIRST}
     found: dict[str, NDArray[Any]] = {'sample': samples, 'time': period * samples}
     rows = {key: np.searchsorted(samples, _numbers(part)) for key, part in records.items()}
     outputs = _outputs(records, run.machine.radius)
@@ -131,9 +132,7 @@ def table(path: str | Path, progress: Progress | None = None) -> Table:
         if column.element is not None:
             values = values[:, column.element]
         found[column.name] = _spread(values, rows[column.topic], len(samples))
-        named[column.name] = column.unit, column.description
-    units = {name: unit for name, (unit, _) in named.items()}
-    texts = {name: text for name, (_, text) in named.items()}
+        units[column.name], texts[column.name] = column.unit, column.description
     return Table(found, units, texts, (*bag.notes, *notes))
 
 
@@ -143,16 +142,7 @@ def _records(bag: Bag) -> dict[str, Records]:
     for batch in bag.batches():
         for key, records in batch.samples.items():
             parts.setdefault(key, []).append(records)
-    return {key: _in_order(_joined(found)) for key, found in parts.items()}
-
-
-def _joined(parts: list[Records]) -> Records:
-    """One array, whose fields need not lie as in the messages."""
-    names = parts[0].dtype.names or ()
-    joined = np.empty(sum(map(len, parts)), [(name, parts[0].dtype[name]) for name in names])
-    for name in names:
-        joined[name] = np.concatenate([part[name] for part in parts])
-    return joined
+    return {key: _in_order(joined(found)) for key, found in parts.items()}
 
 
 def _numbers(records: Records) -> NDArray[np.int64]:

@@ -11,7 +11,7 @@ from typing import ClassVar
 from ament_index_python.packages import get_package_share_directory
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.msg import Log, ParameterEvent
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosbags.interfaces import (
     Qos,
     QosDurability,
@@ -40,12 +40,8 @@ TOPICS: dict[str, type] = {
 """What is recorded, with the message types."""
 
 _QOS = {
-    '/rosout': QoSProfile(  # also what was logged before the recorder came
-        history=HistoryPolicy.KEEP_LAST,
-        depth=1000,
-        reliability=ReliabilityPolicy.RELIABLE,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL,
-    )
+    # also what was logged before the recorder came
+    '/rosout': QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 }
 
 _POLL_PERIOD = 0.05

@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import yaml
-from rosbags.interfaces import Qos, QosTime
+from rosbags.interfaces import Qos
+from rosbags.rosbag2.metadata import dump_qos_v9
 
 _VERSION = 9
 _DISTRIBUTION = 'jazzy'
@@ -66,7 +67,7 @@ def bag_information(
                     'name': topic.name,
                     'type': topic.message_type,
                     'serialization_format': 'cdr',
-                    'offered_qos_profiles': [_profile(qos) for qos in topic.qos],
+                    'offered_qos_profiles': dump_qos_v9(list(topic.qos)),
                     'type_description_hash': topic.type_hash,
                 },
                 'message_count': topic.count,
@@ -83,30 +84,12 @@ def bag_information(
 
 def offered_qos(profiles: Sequence[Qos]) -> str:
     """QoS profiles as YAML, for a channel of the file."""
-    return as_yaml([_profile(qos) for qos in profiles])
+    return as_yaml(dump_qos_v9(list(profiles)))
 
 
 def as_yaml(content: Mapping[str, Any] | Sequence[Any]) -> str:
     """YAML with nothing folded and no aliases."""
     return yaml.dump(content, Dumper=_Dumper, default_flow_style=False, width=1 << 16).strip()
-
-
-def _profile(qos: Qos) -> dict[str, Any]:
-    return {
-        'history': qos.history.name.lower(),
-        'depth': qos.depth,
-        'reliability': qos.reliability.name.lower(),
-        'durability': qos.durability.name.lower(),
-        'deadline': _duration(qos.deadline),
-        'lifespan': _duration(qos.lifespan),
-        'liveliness': qos.liveliness.name.lower(),
-        'liveliness_lease_duration': _duration(qos.liveliness_lease_duration),
-        'avoid_ros_namespace_conventions': qos.avoid_ros_namespace_conventions,
-    }
-
-
-def _duration(time: QosTime) -> dict[str, int]:
-    return {'sec': time.sec, 'nsec': time.nsec}
 
 
 class _Dumper(yaml.SafeDumper):

@@ -134,7 +134,7 @@ class RunWatch:
                 return f'the run has stopped: the stage began anew after sample {before}'
             self._begin(now)
         if self.started:
-            if self._silence.longest(now).duration > self._parameters.timeout:
+            if self._silence.longest(now)[1] > self._parameters.timeout:
                 return f'the run has stopped: {self._silence.blame(publishers, now)}'
         elif 0.0 < self._parameters.start_timeout < waited:
             blame = self._silence.blame(publishers, now)

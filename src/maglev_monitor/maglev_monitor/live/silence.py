@@ -3,19 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
 
 REQUIRED = ('measurement', 'currents', 'reference')
 """Topics without which there is no run."""
 
 _NODES = {'measurement': 'the stage', 'currents': 'the controller', 'reference': 'the reference'}
-
-
-class Silence(NamedTuple):
-    """Topics nobody publishes, and for how long which topic has brought nothing new [s]."""
-
-    key: str
-    duration: float
 
 
 class SilenceWatch:
@@ -35,10 +27,10 @@ class SilenceWatch:
                 self._newest[key] = newest[key]
                 self._since[key] = now
 
-    def longest(self, now: float) -> Silence:
-        """The topic that has been silent longest: where the loop broke first."""
+    def longest(self, now: float) -> tuple[str, float]:
+        """The topic that has been silent longest, where the loop broke first; for how long [s]."""
         key = min(REQUIRED, key=lambda name: self._since[name])
-        return Silence(key, now - self._since[key])
+        return key, now - self._since[key]
 
     def blame(self, publishers: Mapping[str, int], now: float) -> str:
         """Who is missing or silent, in one line.

@@ -8,11 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from maglev_model.axes import AXES
+from maglev_model.axes import AXES, FloatArray
 from maglev_monitor.metrics.derived import SOURCES
 from maglev_monitor.metrics.repeatability import of_moments
-
-FloatArray = NDArray[np.float64]
 
 _FROM, _TO = 0.4, 0.5  # after the reference came to rest: where a deviation is taken [s]
 _STILL = 1e-12  # what a reference at rest may change by, for rounding [m, rad]

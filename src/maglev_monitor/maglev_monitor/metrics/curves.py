@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from maglev_model.axes import FloatArray
 from maglev_model.contract.phases import Phase
 from maglev_monitor.metrics.decoding import Records
 from maglev_monitor.metrics.derived import SOURCES, phase_currents, positions
 from maglev_monitor.metrics.envelope import Envelope
 from maglev_monitor.metrics.run_parameters import RunParameters
-
-FloatArray = NDArray[np.float64]
 
 COLUMNS = {
     'reference': slice(0, 5),

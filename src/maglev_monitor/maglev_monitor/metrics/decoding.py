@@ -41,14 +41,18 @@ def decode(key: str, messages: Sequence[bytes]) -> Records:
     if len(messages) == 1:
         raise DecodeError(f'a message of {len(first)} bytes is no {TOPIC_TYPES[key].message_type}')
     parts = [decode(key, [message]) for message in messages]
-    names = parts[0].dtype.names or ()
-    if any(part.dtype.names != names for part in parts):
+    if any(part.dtype.names != parts[0].dtype.names for part in parts):
         raise DecodeError(f'not every {TOPIC_TYPES[key].message_type} has the same fields')
-    joined = np.zeros(len(parts), [(name, parts[0].dtype[name]) for name in names])
-    for index, part in enumerate(parts):
-        for name in names:
-            joined[name][index] = part[name][0]
-    return joined
+    return joined(parts)
+
+
+def joined(parts: Sequence[Records]) -> Records:
+    """Records with the same fields in one array, whose fields need not lie as in the messages."""
+    names = parts[0].dtype.names or ()
+    whole = np.empty(sum(map(len, parts)), [(name, parts[0].dtype[name]) for name in names])
+    for name in names:
+        whole[name] = np.concatenate([part[name] for part in parts])
+    return whole
 
 
 def stamps(records: Records) -> NDArray[np.int64]:

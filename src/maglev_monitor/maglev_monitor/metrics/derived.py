@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from maglev_model.axes import FloatArray
 from maglev_model.geometry import motor_phase_currents, outputs_of_gaps
 from maglev_monitor.metrics.decoding import Records
-
-FloatArray = NDArray[np.float64]
 
 SOURCES = ('true', 'measured', 'own')
 """Whose position it is, in the order of :func:`positions`.

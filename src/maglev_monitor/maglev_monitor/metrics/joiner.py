@@ -7,6 +7,7 @@ is the same, bit for bit, for a live run and for its bag. No ROS here.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -14,42 +15,24 @@ from maglev_model.contract.phases import Phase
 from maglev_model.contract.wire import KEPT, TOPIC_TYPES
 from maglev_monitor.metrics.decoding import Records, stamps
 
-_COLUMNS: dict[str, tuple[tuple[str, str], ...]] = {
-    'reference': (
-        ('phase', 'phase'),
-        ('segment', 'segment'),
-        ('reference', 'position'),
-        ('target', 'target'),
-    ),
-    'measurement': (('gap', 'gap'), ('x', 'x'), ('z', 'z'), ('late_samples', 'late_samples')),
-    'currents': (
-        ('direct_current', 'direct_current'),
-        ('quadrature_current', 'quadrature_current'),
-    ),
-    'controller': (('saturated', 'saturated'), ('limited_by', 'limited_by'), ('mode', 'mode')),
-    'plant': (
-        ('state', 'state'),
-        ('thermal_load', 'thermal_load'),
-        ('own_length', 'own_length'),
-    ),
+_COLUMNS = {
+    'reference': ('phase', 'segment', 'reference', 'target'),
+    'measurement': ('gap', 'x', 'z', 'late_samples'),
+    'currents': ('direct_current', 'quadrature_current'),
+    'controller': ('saturated', 'limited_by', 'mode'),
+    'plant': ('state', 'thermal_load', 'own_length'),
 }
+_FIELDS = {'reference': 'position'}  # of messages, where a column is called otherwise
 
 
 def _row_type() -> np.dtype[np.void]:
-    columns: list[tuple[str, str] | tuple[str, str, tuple[int]]] = [
-        ('sequence', '<i8'),
-        ('stamp', '<i8'),
-        ('stage_time', '<i8'),
-    ]
+    columns: list[Any] = [(name, '<i8') for name in ('sequence', 'stamp', 'stage_time')]
     for key, names in _COLUMNS.items():
         columns.append((f'has_{key}', '?'))
         fields = {field.name: field for field in TOPIC_TYPES[key].fields}
-        for column, source in names:
-            field = fields[source]
-            if field.length > 1:
-                columns.append((column, field.kind, (field.length,)))
-            else:
-                columns.append((column, field.kind))
+        for column in names:
+            field = fields[_FIELDS.get(column, column)]
+            columns.append((column, field.kind, (field.length,) if field.length > 1 else ()))
     return np.dtype(columns)
 
 
@@ -80,22 +63,15 @@ class Joiner:
     """
 
     def __init__(self, block: int = 500, window: int = KEPT['lockstep']) -> None:
-        if block < 1 or window < 0:
-            raise ValueError(f'block is {block} and window {window}: need block >= 1, window >= 0')
         self._size = block
         self._window = window
         self._pending: dict[int, Records] = {}
         self._next = -1  # number of the first block not handed out yet, -1 before the first one
-        self._newest = dict.fromkeys(TOPIC_TYPES, -1)
+        self.newest = dict.fromkeys(TOPIC_TYPES, -1)
+        """Highest sample number seen on each topic, -1 when there was none."""
         self.end: int | None = None
         """First sample of END in the reference, None while there is none."""
         self.dropped = 0
-        self.duplicates = 0
-
-    @property
-    def newest(self) -> dict[str, int]:
-        """Highest sample number seen on each topic, -1 when there was none."""
-        return dict(self._newest)
 
     def add(self, key: str, records: Records) -> None:
         """Take records of one topic, from :func:`~.samples.decode`, in any order."""
@@ -103,26 +79,23 @@ class Joiner:
             return
         sequence = records['sequence'].astype(np.int64)
         numbers = sequence // self._size
-        for number in np.unique(numbers):
+        for number in np.unique(numbers).tolist():
             inside = np.flatnonzero(numbers == number)
             if number < self._next:
                 self.dropped += len(inside)
-                continue
-            self._fill(
-                self._block(int(number)), key, sequence[inside] % self._size, records[inside]
-            )
+            else:
+                rows = sequence[inside] % self._size
+                self._fill(self._block(number), key, rows, records[inside])
         if key == 'reference' and self.end is None:
             ends = sequence[records['phase'] == Phase.END]
             self.end = int(ends.min()) if len(ends) else None
-        self._newest[key] = max(self._newest[key], int(sequence.max()))
+        self.newest[key] = max(self.newest[key], int(sequence.max()))
 
     def take(self) -> Iterator[Records]:
         """Hand out complete blocks, in order: arrays of :data:`ROW`, shape (block,)."""
-        stage = max(self._newest['measurement'], self._newest['currents'])
+        stage = max(self.newest['measurement'], self.newest['currents'])
         absent = stage - min(self._window, _ABSENT)
-        last = min(
-            max(n, stage - self._window if n >= 0 else absent) for n in self._newest.values()
-        )
+        last = min(max(n, stage - self._window if n >= 0 else absent) for n in self.newest.values())
         while self._pending:
             number = min(self._pending)
             if (number + 1) * self._size - 1 > last:
@@ -134,7 +107,7 @@ class Joiner:
 
         What is only on its way when a run is broken off, and a reference ahead of it, is not lost.
         """
-        newest = [n for key, n in self._newest.items() if key != 'reference' and n >= 0]
+        newest = [n for key, n in self.newest.items() if key != 'reference' and n >= 0]
         last = min((n for n in newest if n > max(newest) - _ON_ITS_WAY), default=-1)
         if self.end is not None and self.end <= max(newest, default=-1):
             last = max(last, self.end)
@@ -158,14 +131,12 @@ class Joiner:
         return block
 
     def _fill(self, block: Records, key: str, rows: np.ndarray, records: Records) -> None:
-        present = block[f'has_{key}']
-        self.duplicates += int(np.count_nonzero(present[rows]))
-        present[rows] = True
+        block[f'has_{key}'][rows] = True
         sent = records.dtype.names or ()
         if key == 'measurement':
             block['stage_time'][rows] = stamps(records)
-            wall_time = records['wall_time'] if 'wall_time' in sent else stamps(records)
-            block['stamp'][rows] = wall_time
-        for column, source in _COLUMNS[key]:
-            if source in sent:
-                block[column][rows] = records[source]
+            block['stamp'][rows] = records['wall_time'] if 'wall_time' in sent else stamps(records)
+        for column in _COLUMNS[key]:
+            field = _FIELDS.get(column, column)
+            if field in sent:
+                block[column][rows] = records[field]

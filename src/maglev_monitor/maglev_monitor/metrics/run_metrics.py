@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from maglev_model.axes import AXES
+from maglev_model.axes import AXES, FloatArray
 from maglev_model.contract.phases import Phase
 from maglev_model.contract.wire import TOPIC_TYPES
 from maglev_monitor.metrics.arrivals import Arrivals
@@ -27,8 +27,6 @@ from maglev_monitor.metrics.holes import Holes
 from maglev_monitor.metrics.run_parameters import RunParameters
 from maglev_monitor.metrics.step_response import StepTracker
 from maglev_monitor.metrics.verdict import verdict
-
-FloatArray = NDArray[np.float64]
 
 LIMITS = {'current': 1, 'levitation': 2}
 """What limits currents, as bits of ControllerState's ``limited_by``."""
@@ -257,23 +255,21 @@ class _Tracking:
             self._max[source] = np.maximum(self._max[source], magnitude.max(axis=0))
 
     def result(self, source: int) -> dict[str, dict[str, float | None]]:
-        count = int(self._count[source])
-        by_axis: dict[str, dict[str, float | None]] = {}
-        for index, axis in enumerate(AXES):
-            by_axis[axis] = {
-                'mean_abs_error': _known(self._sum[source, index] / count) if count else None,
-                'rms_error': _known(np.sqrt(self._squares[source, index] / count))
-                if count
-                else None,
-                'max_abs_error': _known(self._max[source, index]) if count else None,
-                'bias': _known(self._signed[source, index] / count) if count else None,
+        known = self._count[source] > 0
+        count = max(int(self._count[source]), 1)
+        figures = {
+            'mean_abs_error': self._sum[source] / count,
+            'rms_error': np.sqrt(self._squares[source] / count),
+            'max_abs_error': self._max[source],
+            'bias': self._signed[source] / count,
+        }
+        return {  # NaN where a tilt could not be made out
+            axis: {
+                name: float(values[index]) if known and not np.isnan(values[index]) else None
+                for name, values in figures.items()
             }
-        return by_axis
-
-
-def _known(value: float) -> float | None:
-    """A figure, or None where a tilt could not be made out."""
-    return None if np.isnan(value) else float(value)
+            for index, axis in enumerate(AXES)
+        }
 
 
 class _Currents:

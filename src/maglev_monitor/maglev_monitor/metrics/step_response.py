@@ -7,11 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from maglev_model.axes import AXES
+from maglev_model.axes import AXES, FloatArray
 from maglev_monitor.metrics.derived import SOURCES
 from maglev_monitor.metrics.run_parameters import MetricsParameters
-
-FloatArray = NDArray[np.float64]
 
 _ROUNDING = 1e-12  # a whole count of error is within a bound of one count [m, rad]
 

@@ -21,13 +21,11 @@ from bokeh.models import (
 from bokeh.plotting import figure
 from bokeh.resources import Resources
 from bokeh.transform import dodge
-from numpy.typing import NDArray
 
+from maglev_model.axes import FloatArray
 from maglev_model.contract.phases import Phase
 from maglev_monitor.metrics.curves import COLUMNS
 from maglev_monitor.metrics.envelope import Envelope
-
-FloatArray = NDArray[np.float64]
 
 REFERENCE, POSITION, ERROR, SECOND = '#8b949e', '#1f77c9', '#d55e00', '#009e73'
 COLOURS = (POSITION, ERROR, SECOND, '#cc79a7', '#e69f00', '#56b4e9', REFERENCE)

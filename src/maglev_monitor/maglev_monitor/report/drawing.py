@@ -13,12 +13,10 @@ import numpy as np
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from maglev_model.axes import FloatArray
 from maglev_monitor.metrics.curves import COLUMNS
 from maglev_monitor.metrics.envelope import Envelope
-
-FloatArray = NDArray[np.float64]
 
 REFERENCE, POSITION, ERROR, SECOND = '#9a9a9a', '#1f5fa8', '#c2452d', '#2a8a62'
 STYLE = {

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from maglev_model.axes import AXES
+from maglev_model.axes import AXES, FloatArray
 from maglev_model.contract.phases import Phase
 from maglev_monitor.bag.analysis import Analysis
 from maglev_monitor.metrics.curves import COLUMNS, StepCurves
@@ -35,8 +35,6 @@ from maglev_monitor.report.chart import (
 from maglev_monitor.report.error_charts import reversals, spectrum
 from maglev_monitor.report.published import first_number, published_step, published_tracking
 from maglev_monitor.report.scales import FLOOR, MOVES, TITLES, units
-
-FloatArray = NDArray[np.float64]
 
 _SINCE = 'time since lift-off [s]'
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from maglev_model.axes import FloatArray
 
 _NONE = np.iinfo(np.int64).min
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from maglev_model.contract.wire import DecodeError
 from maglev_monitor.metrics.decoding import decode
@@ -25,7 +25,6 @@ from maglev_view.web.live import Live
 if TYPE_CHECKING:
     from maglev_view.web.page import Page
 
-_DEPTHS = {CONTROLLER_STATE: 16384}  # of which each sample counts; of the others the newest
 _MISSING = "the live view needs viser: run 'MAGLEV_SETUP=view source setup.sh', then again"
 
 
@@ -52,8 +51,7 @@ class WebNode(MaglevNode[WebNodeParameters]):
         self._live = Live(self.parameters)
         self._operator = Operator(self, self._page.answer)
         self._taps = {
-            topic: self.poll(topic, SAMPLE_TOPICS[topic], _qos(_DEPTHS.get(topic, 1)), raw=True)
-            for topic in KEYS
+            topic: self.poll(topic, SAMPLE_TOPICS[topic], _qos(topic), raw=True) for topic in KEYS
         }
         self.create_subscription(DiagnosticArray, DIAGNOSTICS, self._on_diagnostics, 100)
         self.create_timer(1.0 / self.parameters.rate, self._update, clock=self.steady_clock)
@@ -96,10 +94,7 @@ class WebNode(MaglevNode[WebNodeParameters]):
             self._live.told(status.name, status.level[0], status.message, values)
 
 
-def _qos(depth: int) -> QoSProfile:
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST,
-        depth=depth,
-        reliability=ReliabilityPolicy.BEST_EFFORT,  # nobody repeats a sample for a view
-        durability=DurabilityPolicy.VOLATILE,
-    )
+def _qos(topic: str) -> QoSProfile:
+    """Each sample counts of one topic, the newest of the others; nobody repeats one for a view."""
+    depth = 16384 if topic == CONTROLLER_STATE else 1
+    return QoSProfile(depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT)

@@ -20,7 +20,7 @@ _CELL = 'padding:1px 6px 1px 0'
 def status_html(live: Live) -> str:
     """Phase, mode, time, pace, late samples, the errors now, and the faults with their remedies."""
     if live.sequence < 0:
-        return _paragraph('no stage is heard yet')
+        return '<div style="font-size:90%">no stage is heard yet</div>'
     late = 'no sample late' if not live.late_samples else f'{live.late_samples} samples late'
     pace = '' if math.isnan(live.pace) else f' at {live.pace:.2f} × real time'
     rows = [
@@ -89,7 +89,3 @@ def _table(rows: Iterable[tuple[str, str]]) -> str:
         for name, text in rows
     )
     return f'<table style="font-size:90%">{"".join(lines)}</table>'
-
-
-def _paragraph(text: str) -> str:
-    return f'<div style="font-size:90%">{escape(text)}</div>'
