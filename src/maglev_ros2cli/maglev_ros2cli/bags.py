@@ -23,16 +23,11 @@ from rosbags.rosbag2.errors import ReaderError
 
 from maglev_ros2cli.errors import CommandError
 from maglev_ros2cli.parser import Parser
+from maglev_ros2cli.qos import POLICIES
 
 STORAGES = {'.mcap': 'mcap', '.db3': 'sqlite3'}
 """Kinds of storage by the suffixes of their files."""
 
-_POLICIES: dict[str, Any] = {
-    'history': HistoryPolicy,
-    'reliability': ReliabilityPolicy,
-    'durability': DurabilityPolicy,
-    'liveliness': LivelinessPolicy,
-}
 _TIMES = ('deadline', 'lifespan', 'liveliness_lease_duration')
 
 
@@ -123,8 +118,8 @@ def overrides(path: Path | None) -> dict[str, QoSProfile]:
 def _override(values: dict[str, Any]) -> QoSProfile:
     given: dict[str, Any] = {'history': HistoryPolicy.KEEP_LAST, 'depth': 10}
     for name, value in values.items():
-        if name in _POLICIES:
-            given[name] = _POLICIES[name].get_from_short_key(value)
+        if name in POLICIES:
+            given[name] = POLICIES[name].get_from_short_key(value)
         elif name in _TIMES:
             given[name] = Duration(seconds=value.get('sec', 0), nanoseconds=value.get('nsec', 0))
         else:

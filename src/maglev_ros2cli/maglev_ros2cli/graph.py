@@ -6,7 +6,7 @@ import contextlib
 import math
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from typing import Any, NamedTuple
 
 import rclpy
@@ -19,7 +19,7 @@ from maglev_model.programs.arguments import not_negative
 from maglev_node.dds import local_participants, only_here, prepare_middleware
 from maglev_node.polling import PollingNode
 from maglev_ros2cli.errors import CommandError
-from maglev_ros2cli.parser import Parser, complete
+from maglev_ros2cli.parser import Parser, Verbs, complete
 
 QUIET = 0.15
 """Discovery ends when every participant of this machine is seen and nothing new comes so long [s].
@@ -209,6 +209,24 @@ def _shown(found: list[tuple[str, list[str]]], hidden: bool) -> dict[str, list[s
     }
 
 
+def print_all(lines: Collection[str], *, count: bool) -> None:
+    """Each in a line, or only how many there are."""
+    for line in [len(lines)] if count else lines:
+        print(line)
+
+
+def print_type(
+    arguments: Any, name: str, look: Callable[[PollingNode], dict[str, list[str]]]
+) -> int:
+    """The type of a topic or service; of an unknown one exit code 1 and no word, as in ros2cli."""
+    full = absolute(name)
+    with graph(arguments, lambda own: full in look(own)) as own:
+        types = look(own).get(full, [])
+    for each in types:
+        print(each)
+    return 0 if types else 1
+
+
 def absolute(name: str) -> str:
     """The full name of what a command line may name without the leading slash.
 
@@ -254,7 +272,18 @@ def answer(own: PollingNode, client: Any, request: Any, *, resend: float = math.
     return next(future.result() for future in futures if future.done())
 
 
-# -- completion ------------------------------------------------------------------------------------
+# -- arguments -------------------------------------------------------------------------------------
+
+
+def add_node_verb(verbs: Verbs, name: str, run: Any, text: str, **node: Any) -> Parser:
+    """A verb about a node that is named, with the options of such."""
+    verb = verbs.add(name, run, text)
+    add_arguments(verb)
+    add_node_name(verb, **node)
+    verb.add_argument(
+        '--include-hidden-nodes', action='store_true', help='Consider hidden nodes as well'
+    )
+    return verb
 
 
 def add_node_name(parser: Parser, **options: Any) -> None:
@@ -266,13 +295,18 @@ def add_node_name(parser: Parser, **options: Any) -> None:
 def add_topic_name(parser: Parser, text: str) -> None:
     """The argument ``topic_name``, completed from the graph."""
     argument = parser.add_argument('topic_name', help=text)
-    complete(argument, lambda given: _seen(given, lambda own: list(topics(own, hidden=False))))
+    complete(argument, seen_topics)
 
 
 def add_service_name(parser: Parser, text: str) -> None:
     """The argument ``service_name``, completed from the graph."""
     argument = parser.add_argument('service_name', help=text)
     complete(argument, lambda given: _seen(given, lambda own: list(services(own, hidden=False))))
+
+
+def seen_topics(given: Any) -> list[str]:
+    """The topics that a shell offers."""
+    return _seen(given, lambda own: list(topics(own, hidden=False)))
 
 
 def _seen(given: Any, look: Callable[[PollingNode], list[str]]) -> list[str]:

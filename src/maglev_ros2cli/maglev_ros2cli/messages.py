@@ -192,7 +192,7 @@ def _field(field: Any, kind: str, value: Any, stampers: list[Stamper]) -> Any:
         return array.array(field.typecode, value)
     if isinstance(field, list):
         element = re.search(r'\w+/\w+', kind)
-        return [_element(each, element, stampers) for each in value] if element else list(value)
+        return [_element(each, element[0], stampers) if element else each for each in value]
     if hasattr(field, 'get_fields_and_field_types'):
         _fill(field, value, stampers)
         return field
@@ -201,9 +201,8 @@ def _field(field: Any, kind: str, value: Any, stampers: list[Stamper]) -> Any:
     return type(field)(value) if isinstance(field, (float, str)) else value
 
 
-def _element(value: Any, kind: re.Match[str] | None, stampers: list[Stamper]) -> Any:
-    assert kind is not None
-    message = find_type(kind[0], 'msg')()
+def _element(value: Any, kind: str, stampers: list[Stamper]) -> Any:
+    message = find_type(kind, 'msg')()
     _fill(message, value, stampers)
     return message
 

@@ -32,12 +32,11 @@ class Verbs:
     """The verbs of a command, added to its parser one by one."""
 
     def __init__(self, parser: Parser) -> None:
-        command = parser.prog
-        title = f'Call `{command} <command> -h` for more detailed usage.'
+        self._command = parser.prog
+        title = f'Call `{parser.prog} <command> -h` for more detailed usage.'
         self._verbs = parser.add_subparsers(
             title='Commands', metavar=title, dest='verb', parser_class=Parser
         )
-        self._command = command
         parser.set_defaults(run=lambda _: parser.print_help())
 
     def add(self, name: str, run: Callable[[Any], int | None], text: str) -> Parser:

@@ -19,7 +19,7 @@ from rclpy.qos import (
 from maglev_model.programs.arguments import count, not_negative
 from maglev_ros2cli.parser import Parser
 
-_POLICIES: dict[str, Any] = {
+POLICIES: dict[str, Any] = {
     'history': HistoryPolicy,
     'reliability': ReliabilityPolicy,
     'durability': DurabilityPolicy,
@@ -35,7 +35,7 @@ def add_arguments(parser: Parser, default: str) -> None:
         help=f'Quality of service preset profile (default: {default})',
     )
     parser.add_argument('--qos-depth', metavar='N', type=count, help='Queue size setting')
-    for name, policy in _POLICIES.items():
+    for name, policy in POLICIES.items():
         keys = [key for key in policy.short_keys() if key != 'unknown']
         parser.add_argument(
             f'--qos-{name}', choices=keys, help=f'Quality of service {name} setting'
@@ -53,7 +53,7 @@ def asked(arguments: Any) -> QoSProfile:
     """The profile that the options ask for."""
     preset = QoSPresetProfiles.get_from_short_key(arguments.qos_profile or arguments.qos_default)
     profile = copy.copy(preset)
-    for name, policy in _POLICIES.items():
+    for name, policy in POLICIES.items():
         key = getattr(arguments, f'qos_{name}')
         if key is not None:
             setattr(profile, name, policy.get_from_short_key(key))
@@ -65,13 +65,18 @@ def asked(arguments: Any) -> QoSProfile:
     return profile
 
 
-def to_hear(node: Node, topic: str, arguments: Any) -> QoSProfile:
-    """The profile that the options ask for; without any, one that hears every publisher."""
+def to_hear(node: Node, topic: str, arguments: Any, depth: int) -> QoSProfile:
+    """The profile that the options ask for; without any, one that hears every publisher.
+
+    :param depth: how many messages may come between two looks, unless the options say.
+    """
     profile = asked(arguments)
-    options = [*_POLICIES, 'profile', 'depth', 'liveliness_lease_duration_seconds']
-    if any(getattr(arguments, f'qos_{name}') is not None for name in options):
-        return profile
-    return matching(node, topic, profile)
+    options = [*POLICIES, 'profile', 'depth', 'liveliness_lease_duration_seconds']
+    if all(getattr(arguments, f'qos_{name}') is None for name in options):
+        profile = matching(node, topic, profile)
+    if arguments.qos_depth is None:
+        profile.depth = depth
+    return profile
 
 
 def matching(node: Node, topic: str, profile: QoSProfile) -> QoSProfile:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -92,9 +93,9 @@ class _Player:
             qos = given.get(topic) or _recorded(connection)
             name = renamed.get(topic, topic)
             self._publishers[connection.id] = own.create_publisher(kind, name, qos)
-        self._period = 1.0 / arguments.clock if arguments.clock else None
+        self._period = 1.0 / arguments.clock if arguments.clock else math.inf
         self._ticked = 0.0
-        self._clock = own.create_publisher(Clock, '/clock', 10) if self._period else None
+        self._clock = own.create_publisher(Clock, '/clock', 10) if arguments.clock else None
 
     def play(self) -> None:
         """Publish each message at its time."""
@@ -119,20 +120,13 @@ class _Player:
         due = wall + (stamp - self._start) * 1e-9 / self._rate
         while True:
             now = time.monotonic()
-            if self._clock is not None:
-                self._tick(self._start + int((now - wall) * 1e9 * self._rate), now)
+            if self._clock is not None and now - self._ticked >= self._period:
+                self._ticked, message = now, Clock()
+                set_stamp(message.clock, self._start + int((now - wall) * 1e9 * self._rate))
+                self._clock.publish(message)
             if now >= due:
                 return
-            time.sleep(min(due - now, self._period or due - now))
-
-    def _tick(self, stage_time: int, now: float) -> None:
-        assert self._clock is not None
-        assert self._period is not None
-        if now - self._ticked >= self._period:
-            self._ticked = now
-            message = Clock()
-            set_stamp(message.clock, stage_time)
-            self._clock.publish(message)
+            time.sleep(min(due - now, self._period))
 
 
 def _recorded(connection: Connection) -> Any:

@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from rclpy.qos import HistoryPolicy, QoSProfile
+from rclpy.qos import QoSProfile
 from rclpy.topic_or_service_is_hidden import topic_or_service_is_hidden
 
 from maglev_model.programs.command import noted
@@ -22,7 +22,7 @@ from maglev_node.polling import PolledSubscription, PollingNode
 from maglev_ros2cli import qos
 from maglev_ros2cli.bags import add_overrides, overrides
 from maglev_ros2cli.errors import CommandError
-from maglev_ros2cli.graph import absolute, add_arguments, discover, node, topics
+from maglev_ros2cli.graph import absolute, add_arguments, discover, node, seen_topics, topics
 from maglev_ros2cli.messages import find_type
 from maglev_ros2cli.parser import Verbs, complete
 
@@ -35,7 +35,7 @@ def add(verbs: Verbs) -> None:
     """Give the verb to its command."""
     verb = verbs.add('record', record, 'Record ROS data to a bag')
     chosen = verb.add_argument('topics_positional', nargs='*', metavar='topic', help='To record')
-    complete(chosen, _known)
+    complete(chosen, seen_topics)
     verb.add_argument('--topics', nargs='+', default=[], metavar='TOPIC', help='To record')
     verb.add_argument('-a', '--all', action='store_true', help='Record all topics')
     verb.add_argument('--all-topics', dest='all', action='store_true', help='Record all topics')
@@ -135,8 +135,7 @@ class _Recorder:
     def _profile(self, topic: str) -> QoSProfile:
         if topic in self._overrides:
             return self._overrides[topic]
-        deep = QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=_DEPTH)
-        return qos.matching(self._own, topic, deep)
+        return qos.matching(self._own, topic, QoSProfile(depth=_DEPTH))
 
     def _wanted(self, topic: str) -> bool:
         given = self._arguments
@@ -156,9 +155,3 @@ def _expression(text: str) -> re.Pattern[str]:
         return re.compile(text)
     except re.error as error:
         raise argparse.ArgumentTypeError(f"'{text}' is no expression: {error}") from error
-
-
-def _known(given: Any) -> list[str]:
-    with node() as own:
-        discover(own, given.spin_time)
-        return list(topics(own, hidden=False))

@@ -12,13 +12,14 @@ from maglev_node.polling import PollingNode
 from maglev_ros2cli.errors import CommandError
 from maglev_ros2cli.graph import (
     add_arguments,
-    add_node_name,
+    add_node_verb,
     answer,
     ask,
     client,
     graph,
     graph_with,
     nodes,
+    print_all,
     services,
 )
 from maglev_ros2cli.parser import Parser, Verbs, complete
@@ -29,15 +30,15 @@ _GET_STATE = 'lifecycle_msgs/srv/GetState'
 def add(parser: Parser) -> None:
     """Give the verbs to a parser."""
     verbs = Verbs(parser)
-    _verb(verbs, 'get', get, 'Get lifecycle state for one or more nodes', nargs='?')
-    _verb(verbs, 'list', list_, 'Output a list of available transitions')
+    add_node_verb(verbs, 'get', get, 'Get lifecycle state for one or more nodes', nargs='?')
+    add_node_verb(verbs, 'list', list_, 'Output a list of available transitions')
     verb = verbs.add('nodes', nodes_, 'Output a list of nodes with lifecycle')
     add_arguments(verb)
     verb.add_argument('-a', '--all', action='store_true', help='Display all nodes, also hidden')
     verb.add_argument(
         '-c', '--count-nodes', action='store_true', help='Only display the number of nodes'
     )
-    verb = _verb(verbs, 'set', set_, 'Trigger lifecycle state transition')
+    verb = add_node_verb(verbs, 'set', set_, 'Trigger lifecycle state transition')
     transition = verb.add_argument('transition', help='The lifecycle transition')
 
     def known(given: Any) -> list[str]:
@@ -47,25 +48,11 @@ def add(parser: Parser) -> None:
     complete(transition, known)
 
 
-def _verb(verbs: Verbs, name: str, run: Any, text: str, **node: Any) -> Parser:
-    verb = verbs.add(name, run, text)
-    add_arguments(verb)
-    add_node_name(verb, **node)
-    verb.add_argument(
-        '--include-hidden-nodes', action='store_true', help='Consider hidden nodes as well'
-    )
-    return verb
-
-
 def nodes_(arguments: Any) -> None:
     """The managed nodes."""
     with graph(arguments) as own:
         names = _managed(own, hidden=arguments.all)
-    if arguments.count_nodes:
-        print(len(names))
-        return
-    for name in names:
-        print(name)
+    print_all(names, count=arguments.count_nodes)
 
 
 def get(arguments: Any) -> None:
@@ -97,19 +84,12 @@ def set_(arguments: Any) -> None:
     """A transition by its label or number; one that fails is said on stderr, with exit code 0."""
     with graph_with(arguments) as (own, full):
         known = [each.transition for each in _transitions(own, full)]
-        for transition in known:
-            if arguments.transition in (transition.label, str(transition.id)):
-                break
-        else:
-            raise CommandError(
-                '\n- '.join(
-                    [
-                        'Unknown transition requested, available ones are:',
-                        *(f'{each.label} [{each.id}]' for each in known),
-                    ]
-                )
-            )
-        request = ChangeState.Request(transition=transition)
+        wanted = [each for each in known if arguments.transition in (each.label, str(each.id))]
+        if not wanted:
+            listed = [f'\n- {each.label} [{each.id}]' for each in known]
+            text = 'Unknown transition requested, available ones are:'
+            raise CommandError(text + ''.join(listed))
+        request = ChangeState.Request(transition=wanted[0])
         done = answer(own, client(own, ChangeState, f'{full}/change_state'), request).success
     if done:
         print('Transitioning successful')

@@ -19,6 +19,7 @@ from maglev_ros2cli.graph import (
     add_node_name,
     graph,
     nodes,
+    print_all,
 )
 from maglev_ros2cli.parser import Parser, Verbs
 
@@ -44,17 +45,13 @@ def list_(arguments: Any) -> None:
     """All nodes, sorted."""
     with graph(arguments) as own:
         names = [each.full for each in nodes(own, hidden=arguments.all)]
-    if arguments.count_nodes:
-        print(len(names))
-        return
-    if len(names) > len(set(names)):
+    if not arguments.count_nodes and len(names) > len(set(names)):
         print(
             'WARNING: Be aware that there are nodes in the graph that share an exact name, which'
             ' can have unintended side effects.',
             file=sys.stderr,
         )
-    for name in names:
-        print(name)
+    print_all(names, count=arguments.count_nodes)
 
 
 def info(arguments: Any) -> None:

@@ -18,8 +18,7 @@ from rclpy.parameter import (
 from maglev_node.polling import PollingNode
 from maglev_ros2cli.errors import CommandError
 from maglev_ros2cli.graph import (
-    add_arguments,
-    add_node_name,
+    add_node_verb,
     ask,
     graph,
     graph_with,
@@ -46,35 +45,27 @@ _TYPES = {
 def add(parser: Parser) -> None:
     """Give the verbs to a parser."""
     verbs = Verbs(parser)
-    verb = _verb(verbs, 'describe', describe, 'Show descriptive information about parameters')
+    verb = add_node_verb(
+        verbs, 'describe', describe, 'Show descriptive information about parameters'
+    )
     _add_parameter_name(verb, 'parameter_names', nargs='+')
-    _verb(verbs, 'dump', dump, 'Show all of the parameters of a node in a YAML file format')
-    verb = _verb(verbs, 'get', get, 'Get parameter')
+    add_node_verb(verbs, 'dump', dump, 'Show all of the parameters of a node in a YAML file format')
+    verb = add_node_verb(verbs, 'get', get, 'Get parameter')
     _add_parameter_name(verb, 'parameter_name')
     verb.add_argument('--hide-type', action='store_true', help='Hide the type information')
-    verb = _verb(verbs, 'list', list_, 'Output a list of available parameters', nargs='?')
+    verb = add_node_verb(verbs, 'list', list_, 'Output a list of available parameters', nargs='?')
     verb.add_argument(
         '--param-prefixes', nargs='+', default=[], help='Only parameters with these prefixes'
     )
     verb.add_argument('--param-type', action='store_true', help='Also print the types')
-    verb = _verb(verbs, 'load', load, 'Load parameter file for a node')
+    verb = add_node_verb(verbs, 'load', load, 'Load parameter file for a node')
     verb.add_argument('parameter_file', type=Path, help='Parameter file')
     verb.add_argument(
         '--no-use-wildcard', action='store_true', help="Leave out what is given for '/**'"
     )
-    verb = _verb(verbs, 'set', set_, 'Set parameter')
+    verb = add_node_verb(verbs, 'set', set_, 'Set parameter')
     _add_parameter_name(verb, 'parameter_name')
     verb.add_argument('value', help='Value of the parameter')
-
-
-def _verb(verbs: Verbs, name: str, run: Any, text: str, **node: Any) -> Parser:
-    verb = verbs.add(name, run, text)
-    add_arguments(verb)
-    add_node_name(verb, **node)
-    verb.add_argument(
-        '--include-hidden-nodes', action='store_true', help='Consider hidden nodes as well'
-    )
-    return verb
 
 
 def _add_parameter_name(verb: Parser, name: str, **options: Any) -> None:

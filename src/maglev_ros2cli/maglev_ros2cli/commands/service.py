@@ -14,6 +14,8 @@ from maglev_ros2cli.graph import (
     answer,
     graph,
     node,
+    print_all,
+    print_type,
     services,
     wait_until,
 )
@@ -55,21 +57,16 @@ def list_(arguments: Any) -> None:
     """All services, sorted."""
     with graph(arguments) as own:
         found = services(own, hidden=arguments.include_hidden_services)
-    if arguments.count_services:
-        print(len(found))
-        return
-    for name, types in found.items():
-        print(f'{name} [{", ".join(types)}]' if arguments.show_types else name)
+    shown = [
+        f'{name} [{", ".join(types)}]' if arguments.show_types else name
+        for name, types in found.items()
+    ]
+    print_all(shown, count=arguments.count_services)
 
 
 def type_(arguments: Any) -> int:
-    """The type of one service; of an unknown one exit code 1 and no word, as in ros2cli."""
-    name = absolute(arguments.service_name)
-    with graph(arguments, lambda own: name in services(own)) as own:
-        types = services(own).get(name)
-    for each in types or ():
-        print(each)
-    return 0 if types else 1
+    """The type of one service."""
+    return print_type(arguments, arguments.service_name, services)
 
 
 def call(arguments: Any) -> None:

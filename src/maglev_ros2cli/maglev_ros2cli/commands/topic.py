@@ -6,7 +6,7 @@ from typing import Any
 
 from maglev_ros2cli.commands import topic_echo, topic_hz, topic_pub
 from maglev_ros2cli.errors import CommandError
-from maglev_ros2cli.graph import absolute, add_arguments, add_topic_name, graph, topics
+from maglev_ros2cli.graph import absolute, add_arguments, add_topic_name, graph, print_type, topics
 from maglev_ros2cli.parser import Parser, Verbs
 
 
@@ -84,10 +84,5 @@ def info(arguments: Any) -> None:
 
 
 def type_(arguments: Any) -> int:
-    """The type of one topic; of an unknown one exit code 1 and no word, as in ros2cli."""
-    name = absolute(arguments.topic_name)
-    with graph(arguments, lambda own: name in topics(own)) as own:
-        types = topics(own).get(name)
-    for each in types or ():
-        print(each)
-    return 0 if types else 1
+    """The type of one topic."""
+    return print_type(arguments, arguments.topic_name, topics)

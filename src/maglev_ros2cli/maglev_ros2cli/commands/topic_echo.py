@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -61,7 +62,7 @@ def echo(arguments: Any) -> None:
     topic = absolute(arguments.topic_name)
     with graph(arguments, lambda own: own.count_publishers(topic)) as own:
         kind = find_type(arguments.message_type or the_type(own, topic), 'msg')
-        for message, _ in heard(own, topic, kind, arguments):
+        for message in heard(own, topic, kind, arguments):
             if arguments.raw:
                 print(message, end='\n---\n')
             else:
@@ -86,18 +87,13 @@ def the_type(own: PollingNode, topic: str) -> str:
     return types[0]
 
 
-def heard(
-    own: PollingNode, topic: str, kind: type, arguments: Any, *, raw: bool = False
-) -> Iterator[tuple[Any, int]]:
-    """Messages of a topic with their times of reception [ns], None when there is none now."""
-    profile = qos.to_hear(own, topic, arguments)
-    if arguments.qos_depth is None:
-        profile.depth = _DEPTH
-    tap = own.poll(topic, kind, profile, raw=raw or getattr(arguments, 'raw', False))
-    timeout = getattr(arguments, 'timeout', None)
-    end = None if timeout is None else time.monotonic() + timeout
-    while end is None or time.monotonic() < end:
-        yield from tap.take()
+def heard(own: PollingNode, topic: str, kind: type, arguments: Any) -> Iterator[Any]:
+    """Messages of a topic, until time is over."""
+    tap = own.poll(topic, kind, qos.to_hear(own, topic, arguments, _DEPTH), raw=arguments.raw)
+    end = math.inf if arguments.timeout is None else time.monotonic() + arguments.timeout
+    while time.monotonic() < end:
+        for message, _ in tap.take():
+            yield message
         time.sleep(_POLL)
 
 

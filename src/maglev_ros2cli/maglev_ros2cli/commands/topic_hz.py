@@ -43,9 +43,7 @@ def hz(arguments: Any) -> None:
         if topic not in topics(own):
             print(f'WARNING: topic [{topic}] does not appear to be published yet')
             wait_until(lambda: topic in topics(own))
-        profile = qos.to_hear(own, topic, arguments)
-        if arguments.qos_depth is None:
-            profile.depth = _DEPTH
+        profile = qos.to_hear(own, topic, arguments, _DEPTH)
         tap = own.poll(topic, find_type(the_type(own, topic), 'msg'), profile, raw=True)
         intervals: collections.deque[float] = collections.deque(maxlen=arguments.window)
         last, told, fresh = 0, time.monotonic(), False
