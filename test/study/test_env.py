@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import math
+import pickle
 import warnings
 from typing import Any
 
@@ -103,6 +105,34 @@ def test_who_lets_go_of_the_platen_has_lost_it() -> None:
     assert lost
     assert reward == 0.0
     assert not truncated
+
+
+@pytest.mark.parametrize('action', ['accelerations', 'currents'])
+@pytest.mark.parametrize('twin', [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
+def test_a_copy_goes_on_where_it_is_and_by_itself(twin: Any, action: str) -> None:
+    env = StageEnv(duration=0.4, action=action)
+    env.reset(seed=1)
+    for _ in range(150):
+        env.step(env.default_action())
+    other = twin(env)
+    ahead = [env.step(env.default_action()) for _ in range(50)]
+    for observation, reward, *_ in ahead:
+        again, same, *_ = other.step(other.default_action())
+        np.testing.assert_array_equal(again, observation)
+        assert same == reward
+
+
+def test_an_action_of_another_shape_or_without_a_number_is_refused_and_nothing_moves() -> None:
+    env, untouched = StageEnv(duration=0.3), StageEnv(duration=0.3)
+    for each in (env, untouched):
+        each.reset(seed=1)
+    for action in (0.1, [0.1], np.zeros(8), np.zeros((5, 1)), [0.0, 0.0, 0.0, 0.0, math.nan]):
+        with pytest.raises(ValueError, match=r'it must be numbers of shape \(5,\)'):
+            env.step(action)  # type: ignore[arg-type]
+    beyond = np.array([math.inf, 0.0, 0.0, 0.0, -2.0], np.float32)
+    step, same = env.step(beyond), untouched.step(np.clip(beyond, -1.0, 1.0))
+    np.testing.assert_array_equal(step[0], same[0])
+    assert step[1] == same[1]
 
 
 def test_what_it_refuses() -> None:

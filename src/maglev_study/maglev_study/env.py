@@ -144,8 +144,15 @@ class StageEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     def step(
         self, action: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        """Answer a sample, and go on to the next."""
+        """Answer a sample, and go on to the next.
+
+        What is beyond the bounds of an action counts as these. Raises ValueError for another shape
+        and for what is no number; nothing has moved then.
+        """
         asked = np.clip(np.asarray(action, dtype=np.float64), -1.0, 1.0)
+        if asked.shape != self.action_space.shape or np.isnan(asked).any():
+            shape = self.action_space.shape
+            raise ValueError(f"'action' is {action}, it must be numbers of shape {shape}")
         direct, quadrature, arrays = self._direct, self._quadrature, self._regulator.arrays
         if self._by_currents:
             direct[:], quadrature[:] = self._current * asked.reshape(2, 4)

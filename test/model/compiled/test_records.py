@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+from collections.abc import Callable
 from typing import Annotated
 
 import numpy as np
@@ -91,6 +94,15 @@ def test_copies_of_a_block_bring_everything_back() -> None:
     tank.block[:] = saved
     assert (tank.level, tank.turns, tank.counts.tolist()) == (1.0, 0, [3] * 5)
     assert not tank.past.any()
+
+
+@pytest.mark.parametrize('copied', [copy.deepcopy, lambda tank: pickle.loads(pickle.dumps(tank))])
+def test_a_copy_has_one_memory_too_and_its_own(copied: Callable[[Tank], Tank]) -> None:
+    tank = Tank(level=1.0, counts=3)
+    twin = copied(tank)
+    work(twin.block)
+    assert (twin.level, twin.counts.tolist(), twin.past[1, 2]) == (1.5, [3, 3, 3, 1, 3], 1.5)
+    assert (tank.level, tank.counts.tolist(), tank.past[1, 2]) == (1.0, [3] * 5, 0.0)
 
 
 def test_what_is_no_field_is_refused() -> None:

@@ -43,6 +43,14 @@ class Record:
         for name, value in values.items():
             self.block[name] = value.block if name in self._records else value
 
+    def __getstate__(self) -> Block:
+        """What is copied and goes to another process: the arrays are views, and made again."""
+        return self.block
+
+    def __setstate__(self, block: Block) -> None:
+        """Be a copy."""
+        self._hold(block)
+
     def _hold(self, block: Block) -> None:
         self.block: Block = block
         self._arrays: dict[str, Any] = {name: block[name][0] for name in self.dtype.names or ()}
