@@ -85,7 +85,7 @@ def test_rotated(ellipse: FlightRecord) -> None:
 
 
 def test_what_is_wrong_is_named() -> None:
-    with pytest.raises(ParameterError, match="'trajectory' is 'elipse', it must be one of hold"):
+    with pytest.raises(ParameterError, match="'trajectory' is 'elipse', it must be one of ellipse"):
         fly('elipse')
     with pytest.raises(ParameterError, match=r"no parameter 'encoder.gap_noize'"):
         fly('ellipse', plant={'encoder.gap_noize': 1e-6})

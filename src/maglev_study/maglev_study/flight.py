@@ -24,7 +24,7 @@ from maglev_model.contract.phases import Phase
 from maglev_model.parameters import ParameterError, from_yaml, replace
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
-from maglev_reference.parameters import ReferenceParameters
+from maglev_reference.parameters import TRAJECTORIES, ReferenceParameters
 from maglev_reference.timeline import Timeline
 from maglev_study.closed_loop import Run, run
 from maglev_study.references import References
@@ -108,14 +108,7 @@ def fly(
     MeasurementFault when the regulator gives the platen up, LawFault when a law of your own fails,
     TypeError for a trajectory that is no name.
     """
-    followed: dict[str, object] = {}
-    if not isinstance(trajectory, str | None):
-        raise TypeError(
-            f"'trajectory' is a {type(trajectory).__name__}, it takes a name such as 'ellipse'; "
-            'what belongs to it is given as reference={...}'
-        )
-    if trajectory is not None:
-        followed.update(_NAMED.get(trajectory, {'trajectory': trajectory}))
+    followed = _followed(trajectory)
     if duration is not None:
         followed['duration'] = duration
     stage_table = _table(PlantParameters, 'plant', files, plant)
@@ -144,6 +137,24 @@ def fly(
     )
     time = course.sample_time * np.arange(block.phase.size, dtype=np.float64)
     return FlightRecord(time, block.phase, references, outcome, learning)
+
+
+def _followed(trajectory: str | None) -> dict[str, object]:
+    """The parameters of the reference that a trajectory's name stands for."""
+    if trajectory is None:
+        return {}
+    if not isinstance(trajectory, str):
+        raise TypeError(
+            f"'trajectory' is a {type(trajectory).__name__}, it takes a name such as 'ellipse'; "
+            'what belongs to it is given as reference={...}'
+        )
+    known = (*_NAMED, *TRAJECTORIES)
+    if '.' not in trajectory and trajectory not in known:
+        raise ParameterError(
+            f"'trajectory' is '{trajectory}', it must be one of {', '.join(known)},"
+            ' or the dotted path of a module'
+        )
+    return dict(_NAMED.get(trajectory, {'trajectory': trajectory}))
 
 
 def _table(
