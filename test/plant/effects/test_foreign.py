@@ -127,7 +127,9 @@ def reading(length, channel, sample, memory):
     ('group', 'body', 'why'),
     [
         ('friction', 'level / velocity', "'force' raised ZeroDivisionError: division by zero"),
+        ('friction', 'memory[4]', "'force' raised IndexError: index is out of bounds"),
         ('motor', 'out[0] = 1.0', r"'forces' gives \[ 1\. nan\] at rest"),
+        ('motor', 'out[2] = 0.0', "'forces' raised IndexError: index is out"),
         ('sensor', 'math.inf', "'reading' gives inf at rest"),
     ],
 )

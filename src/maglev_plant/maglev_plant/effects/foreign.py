@@ -12,7 +12,8 @@ Numba compiles:
 - ``reading(length, channel, sample, memory)``: what encoder ``channel`` (0..5) reads of a length
   [m]; ``memory`` as above.
 
-Each is tried once, at rest at 25 mm. What raises in flight gives NaN, which no flight goes on with.
+Each is tried once, at rest at 25 mm. What raises in flight, as an index out of bounds does, gives
+NaN, which no flight goes on with.
 """
 
 from __future__ import annotations
@@ -157,7 +158,7 @@ def _address(
 ) -> int:
     """Of the compiled function, once it is ``tried`` and gives what is finite."""
     module, where = find_plugin(parameter, name, (function,)), f"parameter '{parameter}' is"
-    model = numba().njit(getattr(module, function))
+    model = numba().njit(getattr(module, function), boundscheck=True)
     try:
         compiled = make(model)
     except numba().core.errors.NumbaError as error:
