@@ -24,10 +24,10 @@ install_hint() {
 
 # Sets branch (wheels or native), and for native ros_setup, the setup.bash of the ROS 2 Jazzy to
 # use, and ros_prefix, where it lies. A ROS from wheels, of this or another clone, is not one to
-# build on: it counts as none.
+# build on: it counts as none, also where it is gone since it was sourced.
 choose_branch() {
   branch=native ros_prefix='' ros_setup=''
-  local entry entries from_wheels=''
+  local entry entries from_wheels=${_ROS_WHEELS_BOOTSTRAP_COMPLETE:-}
   if [[ -n ${ROS_DISTRO:-} && $ROS_DISTRO != jazzy ]]; then
     fail "ROS $ROS_DISTRO is sourced in this shell and this workspace is for ROS 2 Jazzy:" \
       'open a shell without it, or one with "source /opt/ros/jazzy/setup.bash"'
@@ -35,7 +35,7 @@ choose_branch() {
   if [[ -n ${ROS_DISTRO:-} ]]; then
     IFS=: read -ra entries <<<"${AMENT_PREFIX_PATH:-}"
     for entry in "${entries[@]}"; do
-      if [[ -f $entry/.made-by-setup ]]; then
+      if [[ $entry == "$venv" || -f $entry/.made-by-setup ]]; then
         from_wheels=yes
       elif [[ -f $entry/share/rclpy/package.xml ]]; then
         ros_prefix=$entry

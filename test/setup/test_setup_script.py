@@ -171,6 +171,19 @@ def test_a_jazzy_from_wheels_is_none_to_build_on(machine: Machine, tmp_path: Pat
 
 
 @needs_wheels
+@pytest.mark.parametrize('whose', ['this', 'another'])
+def test_a_jazzy_from_wheels_that_is_gone_since_it_was_sourced(
+    whose: str, machine: Machine, tmp_path: Path
+) -> None:
+    """As while another shell makes .venv anew, or where somebody has deleted it."""
+    (machine.bin / 'make').unlink()
+    sourced = {'this': machine.root, 'another': tmp_path}[whose] / '.venv'
+    marked = {'this': {}, 'another': {'_ROS_WHEELS_BOOTSTRAP_COMPLETE': '1'}}[whose]
+    line = machine.refusal(ROS_DISTRO='jazzy', AMENT_PREFIX_PATH=str(sourced), **marked)
+    assert 'missing: make' in line
+
+
+@needs_wheels
 def test_python_is_missing(machine: Machine) -> None:
     (machine.bin / 'python3').unlink()
     assert 'no Python and this needs Python 3.10 to 3.13' in machine.refusal()
