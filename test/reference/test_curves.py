@@ -1,5 +1,6 @@
 """Curves and waypoints: derivatives by differences, and the geometry each is named after."""
 
+import dataclasses
 import itertools
 import math
 
@@ -197,7 +198,7 @@ points = st.lists(
 def test_waypoints_are_reached_at_rest_within_their_limits(points, dwell, repeat):
     y, x, z, phi, theta = zip(*points, strict=True)
     parameters = WaypointParameters(y=y, x=x, z=z, phi=phi, theta=theta, dwell=dwell, repeat=repeat)
-    path = Waypoints(parameters, SAMPLE)
+    path = Waypoints(dataclasses.replace(ReferenceParameters(), waypoints=parameters))
     time = np.arange(round(path.length / SAMPLE) + 1) * SAMPLE
     found = path.evaluate(time)
     rests = ~(found.velocity.any(axis=1) | found.acceleration.any(axis=1))

@@ -16,7 +16,7 @@ from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
 from maglev_reference.check import UnreachableError, utilisation
 from maglev_reference.currents import current_utilisation, motor_currents
-from maglev_reference.fastest import Fastest, FastestMoves
+from maglev_reference.fastest import Fastest
 from maglev_reference.motion import Kinematics
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.timeline import Timeline
@@ -189,7 +189,8 @@ def test_it_rests_at_every_waypoint(x: tuple[float, ...], repeat: bool) -> None:
     given = {'waypoints__y': (0.025,) * len(x), 'waypoints__x': x, 'waypoints__repeat': repeat}
     table = parameters(**still, **given, waypoints__dwell=0.5)
     stood = []
-    for motion in (FastestMoves(table), Waypoints(table.waypoints, PERIOD)):
+    for profile in ('fastest', 'minimum_jerk'):
+        motion = Waypoints(replace(table, {'waypoints.profile': profile}))
         moved = motion.evaluate(np.arange(0.0, motion.length, PERIOD))
         stood.append(int(np.sum(~moved.velocity.any(axis=1))))
     assert stood[0] == pytest.approx(stood[1], abs=2 * len(x))

@@ -10,16 +10,13 @@ until the samples of the result are within them.
 
 from __future__ import annotations
 
-import itertools
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from maglev_model.axes import FloatArray, Y
 from maglev_reference.check import UnreachableError, utilisation, within
 from maglev_reference.currents import current_utilisation, motor_currents
-from maglev_reference.motion import Kinematics, Motion, Stand
+from maglev_reference.motion import Kinematics
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.voltages import voltage_utilisation
 
@@ -168,42 +165,3 @@ class Fastest:
         carried = samples.acceleration[:, Y] <= (1.0 - LEAST_ATTRACTION) * self._gravity
         enough = largest <= self._parameters.limits.current
         return np.asarray(possible & carried & enough)
-
-
-class FastestMoves:
-    """Fastest moves from waypoint to waypoint, with a rest at each; in time as ``Waypoints`` is.
-
-    Raises :class:`UnreachableError` as :class:`Fastest`.
-    """
-
-    def __init__(self, parameters: ReferenceParameters) -> None:
-        given, step = parameters.waypoints, parameters.sample_time
-        points = list(np.array(given.points(), dtype=float).T)
-        self.repeats = given.repeat
-        if len(points) == 1 or (self.repeats and (points[0] != points[-1]).any()):
-            points.append(points[0])
-        self._moves: list[Motion] = [
-            Fastest(a, b, parameters) if (a != b).any() else Stand(a)
-            for a, b in itertools.pairwise(points)
-        ]
-        dwell = max(0, round(given.dwell / step))
-        took = [
-            math.ceil(move.duration / step - 1e-9) if isinstance(move, Fastest) else 1
-            for move in self._moves
-        ]
-        starts = np.cumsum([dwell] + [count + dwell for count in took[:-1]])
-        self._starts = starts * step
-        self.length = float(starts[-1] + took[-1]) * step
-
-    def evaluate(self, time: FloatArray) -> Kinematics:
-        """Position, velocity and acceleration at each time (n,) [s]."""
-        if self.repeats:
-            time = np.mod(time, self.length)
-        number = np.maximum(np.searchsorted(self._starts, time, side='right') - 1, 0)
-        made = Kinematics(*(np.empty((len(time), 5)) for _ in range(3)))
-        for k in np.unique(number):
-            rows = number == k
-            moved = self._moves[k].evaluate(time[rows] - self._starts[k])
-            for column, values in zip(made, moved, strict=True):
-                column[rows] = values
-        return made

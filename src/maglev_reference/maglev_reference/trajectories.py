@@ -13,7 +13,7 @@ from maglev_model.parameters.plugins import plugin_function
 from maglev_model.quintic import minimum_jerk_time
 from maglev_reference.check import UnreachableError
 from maglev_reference.curves import Chirp, Helix, Sinusoids, Square
-from maglev_reference.fastest import Fastest, FastestMoves
+from maglev_reference.fastest import Fastest
 from maglev_reference.motion import Checked, Kinematics, Motion, Quintic, Stand, State
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.waypoints import Waypoints
@@ -75,10 +75,8 @@ def course(parameters: ReferenceParameters) -> Course:
         case 'square':
             square = Square(parameters.square, home)
             return Course(square, period=square.period)
-        case 'waypoints' if parameters.waypoints.profile == 'fastest':
-            return _passing(FastestMoves(parameters))
         case 'waypoints':
-            return _passing(Waypoints(parameters.waypoints, parameters.sample_time))
+            return _passing(Waypoints(parameters))
         case 'file':
             from maglev_reference.path_file import PathFile
 
@@ -140,22 +138,14 @@ class Step(NamedTuple):
     jumps: bool
 
 
-def _check_time(number: int, takes: float, parameters: ReferenceParameters) -> None:
-    """Refuse a shaped step that would be cut short, and judged against where it never gets."""
-    if takes > parameters.duration + 0.5 * parameters.sample_time:
-        raise UnreachableError(
-            f'unreachable reference: step {number} takes {takes:.4g} s, its segment lasts '
-            f'{parameters.duration:g} s (duration)'
-        )
-
-
 def steps(parameters: ReferenceParameters) -> list[Step]:
     """The steps in order.
 
-    Raises UnreachableError for one larger than the limit of its axis, or longer than ``duration``.
+    Raises UnreachableError for one larger than the limit of its axis, or longer than ``duration``,
+    which would be cut short and judged against where it never gets.
     """
     sequence = []
-    table = parameters.steps
+    table, longest = parameters.steps, parameters.duration + 0.5 * parameters.sample_time
     home = np.array(parameters.home)
     for number, (axis, start, target) in enumerate(
         zip(table.axis, table.start, table.target, strict=True), start=1
@@ -176,7 +166,10 @@ def steps(parameters: ReferenceParameters) -> list[Step]:
             least = minimum_jerk_time(target - start, math.inf, table.acceleration[index])
             duration = max(table.shaping_time, least)
             motion = Quintic(State.at_rest(before), State.at_rest(after), duration)
-        if isinstance(motion, Fastest | Quintic):
-            _check_time(number, motion.duration, parameters)
+        if isinstance(motion, Fastest | Quintic) and motion.duration > longest:
+            raise UnreachableError(
+                f'unreachable reference: step {number} takes {motion.duration:.4g} s, its segment '
+                f'lasts {parameters.duration:g} s (duration)'
+            )
         sequence.append(Step(before, after, motion, not table.shaped))
     return sequence
