@@ -62,7 +62,7 @@ class Checked:
                     f'{self._given}, whose motion gives a {name} of shape {part.shape} and type '
                     f'{part.dtype} at {len(time)} times: it must be {(len(time), 5)}, of floats'
                 )
-        return found
+        return Kinematics(*(part.astype(np.float64) for part in found))
 
 
 def state_at(motion: Motion, time: float) -> State:

@@ -102,10 +102,8 @@ class Planner:
         """
         bend = np.clip(self._state.acceleration, -_UNDONE, _UNDONE)
         self._state = start = self._state._replace(acceleration=bend)
-        lower, upper = (
-            np.array(self._parameters.limits.lower),
-            np.array(self._parameters.limits.upper),
-        )
+        limits = self._parameters.limits
+        lower, upper = np.array(limits.lower), np.array(limits.upper)
         margin = _BRAKING_MARGIN * (upper - lower)
         lower, upper = lower + margin, upper - margin
         lower[Y], upper[Y] = self._parameters.home[Y], self._parameters.lift_off.rest_gap
@@ -129,26 +127,25 @@ class Planner:
             crawl.velocity[Y] = table.crawl_speed
             self._move(Phase.LAND, crawl, table.time, target=stop)
             # from v_0 to rest over v_0 T / 2 the speed falls monotonically
-            self._fixed_move(
-                Phase.LAND, State.at_rest(stop), 2.0 * table.crawl_distance / table.crawl_speed
-            )
+            count = max(1, self._samples(2.0 * table.crawl_distance / table.crawl_speed))
+            duration = count * self._parameters.sample_time
+            self._append(Phase.LAND, Quintic(self._state, State.at_rest(stop), duration), count)
         else:
             self._move(Phase.LAND, State.at_rest(stop), table.time)
         self.end()
 
     def end(self) -> None:
         """END for ever where the platen is."""
-        self._append(Phase.END, Stand(self._state.position), None, self._state.position)
+        self._append(Phase.END, Stand(self._state.position), None)
 
     def follow(self, motion: Motion, samples: int) -> None:
         """TRACK along a motion that ends at rest, then HOLD for ever where it ends."""
-        end = state_at(motion, samples * self._parameters.sample_time)
-        self._append(Phase.TRACK, motion, samples, end.position)
-        self._append(Phase.HOLD, Stand(end.position), None, end.position)
+        self._append(Phase.TRACK, motion, samples)
+        self._append(Phase.HOLD, Stand(self._state.position), None)
 
     def rest(self) -> None:
         """REST for ever where the platen is."""
-        self._append(Phase.REST, Stand(self._state.position), None, self._state.position)
+        self._append(Phase.REST, Stand(self._state.position), None)
 
     def _samples(self, duration: float) -> int:
         return round(duration / self._parameters.sample_time)
@@ -158,28 +155,25 @@ class Planner:
         phase: Phase,
         motion: Motion,
         count: int | None,
-        target: FloatArray,
+        target: FloatArray | None = None,
         jumps: bool = False,
     ) -> None:
-        target = np.array(target)
-        self.segments.append(
-            Segment(self._sample, count, self._number, phase, motion, target, jumps)
-        )
-        self._number += 1
+        """``count`` samples of a motion, None for ever; to where it ends, or ``target`` (5,)."""
+        first, number = self._sample, self._number
         if count is not None:
             self._sample += count
             self._state = state_at(motion, count * self._parameters.sample_time)
+        self._number += 1
+        target = np.array(self._state.position if target is None else target)
+        self.segments.append(Segment(first, count, number, phase, motion, target, jumps))
 
     def _stand(self, phase: Phase, duration: float) -> None:
-        position = self._state.position
         count = self._samples(duration)
         if count > 0:
-            self._append(phase, Stand(position), count, position)
+            self._append(phase, Stand(self._state.position), count)
 
     def _follow(self, phase: Phase, motion: Motion, duration: float, jumps: bool = False) -> None:
-        count = max(1, self._samples(duration))
-        end = state_at(motion, count * self._parameters.sample_time)
-        self._append(phase, motion, count, end.position, jumps)
+        self._append(phase, motion, max(1, self._samples(duration)), jumps=jumps)
 
     def _move_to(self, position: FloatArray) -> None:
         """HOLD while moving to rest at a position (5,); nothing when already there."""
@@ -191,11 +185,6 @@ class Planner:
         self, phase: Phase, end: State, duration: float, target: FloatArray | None = None
     ) -> None:
         self._search(phase, lambda _: end, duration, target)
-
-    def _fixed_move(self, phase: Phase, end: State, duration: float) -> None:
-        count = max(1, self._samples(duration))
-        motion = Quintic(self._state, end, count * self._parameters.sample_time)
-        self._append(phase, motion, count, end.position)
 
     def _search(
         self,
@@ -226,23 +215,13 @@ class Planner:
                 break
         assert chosen is not None
         _, motion, count = chosen
-        self._append(phase, motion, count, motion.end.position if target is None else target)
+        self._append(phase, motion, count, target)
 
     def _trial_times(self, end: State, duration: float) -> Iterator[float]:
         limits = self._parameters.limits
-        shortest = max(
-            minimum_jerk_time(distance, velocity, acceleration)
-            for distance, velocity, acceleration in zip(
-                end.position - self._state.position,
-                limits.velocity,
-                limits.acceleration,
-                strict=True,
-            )
-        )
-        first = max(
-            duration,
-            np.ceil(shortest / self._parameters.sample_time) * self._parameters.sample_time,
-        )
+        way, step = end.position - self._state.position, self._parameters.sample_time
+        shortest = max(map(minimum_jerk_time, way, limits.velocity, limits.acceleration))
+        first = max(duration, np.ceil(shortest / step) * step)
         longer = (first * _STRETCH**power for power in range(_TRIALS))
         shorter = (first * _STRETCH**-power for power in range(1, _TRIALS // 2))
         return itertools.chain(longer, shorter)

@@ -8,7 +8,7 @@ the timeline's own first sample; times are sample numbers times the sample time.
 from __future__ import annotations
 
 import bisect
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,24 +41,10 @@ class Block(NamedTuple):
     target: FloatArray  # (n, 5) [m, rad]
 
     @classmethod
-    def empty(cls, count: int) -> Block:
-        """Room for ``count`` samples."""
-        return cls(
-            np.empty(count, dtype=np.uint8),
-            np.empty(count, dtype=np.uint32),
-            *(np.empty((count, 5)) for _ in range(4)),
-        )
-
-    @classmethod
-    def joined(cls, blocks: Sequence[Block]) -> Block:
-        """Blocks one after another."""
+    def joined(cls, blocks: Iterable[Block], rows: slice = slice(None)) -> Block:
+        """Some of the samples, ``rows``, of blocks one after another."""
         columns: Any = zip(*blocks, strict=True)
-        return cls(*(np.concatenate(column) for column in columns))
-
-    def rows(self, rows: slice) -> Block:
-        """Some of the samples, without a copy."""
-        columns: Any = self
-        return Block(*(column[rows] for column in columns))
+        return cls(*(np.concatenate(column)[rows] for column in columns))
 
 
 class Timeline:
@@ -112,19 +98,9 @@ class Timeline:
         """
         if first < 0 or count < 0:
             raise ValueError(f'no samples {first} to {first + count - 1}: they count up from 0')
-        pieces = []
-        sample = first
-        while True:
-            chunk, offset = divmod(sample, _CHUNK)
-            take = min(_CHUNK - offset, first + count - sample)
-            source = self._chunk(chunk)
-            pieces.append(source.rows(slice(offset, offset + take)))
-            sample += take
-            if sample >= first + count:
-                break
-        if len(pieces) == 1:
-            return pieces[0]
-        return Block.joined(pieces)
+        chunk, offset = divmod(first, _CHUNK)
+        chunks = range(chunk, max(first, first + count - 1) // _CHUNK + 1)
+        return Block.joined(map(self._chunk, chunks), slice(offset, offset + count))
 
     def settled(self, sample: int) -> bool:
         """Whether it rests from ``sample`` on, until it is told to lift off."""
@@ -251,24 +227,16 @@ class Timeline:
         return self._cache
 
     def _evaluate(self, first: int, count: int) -> Block:
-        block = Block.empty(count)
-        index = self._index(first)
-        done = 0
-        while done < count:
-            segment = self._segments[index]
-            sample = first + done
-            take = min(count - done, segment.last - sample + 1)
-            rows = slice(done, done + take)
-            start = sample - segment.first
-            time = np.arange(start, start + take, dtype=np.float64)
+        pieces, stop = [], first + count
+        for segment in self._segments[self._index(first) : self._index(stop - 1) + 1]:
+            begin, end = max(first, segment.first), min(stop, segment.last + 1)
+            time = np.arange(begin - segment.first, end - segment.first, dtype=np.float64)
             moved = segment.motion.evaluate(self._parameters.sample_time * time)
-            block.phase[rows] = segment.phase
-            block.segment[rows] = segment.number
-            block.target[rows] = segment.target
-            block.position[rows], block.velocity[rows], block.acceleration[rows] = moved
-            done += take
-            index += 1
-        return block
+            phase = np.full(len(time), segment.phase, np.uint8)
+            number = np.full(len(time), segment.number, np.uint32)
+            target = np.tile(segment.target, (len(time), 1))
+            pieces.append(Block(phase, number, *moved, target))
+        return Block.joined(pieces)
 
     def _check(self) -> None:
         """What is measured first, so that it and not the way to it is found at fault."""
