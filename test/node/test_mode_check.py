@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from maglev_node.mode_check import SampleTimeCheck
+from maglev_node.mode_check import StageCheck
 
 BEGUN = 1_700_000_000_000_000_000  # [ns]
 
 
 def said(samples: Iterable[tuple[int, int]]) -> list[str]:
-    check = SampleTimeCheck(1e-3)
-    return [text for sample in samples if (text := check.conflict(*sample))]
+    check = StageCheck('realtime', 1e-3)
+    measurements = (SimpleNamespace(sequence=n, stamp=t, lockstep=False) for n, t in samples)
+    return [text for each in measurements if (text := check.conflict(each))]
 
 
 @pytest.mark.parametrize('every', [1, 16])

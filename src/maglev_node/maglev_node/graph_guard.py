@@ -57,8 +57,8 @@ class GraphGuard:
         known = self._node.discovering_since + (0.0 if dds.only_here() else DISCOVERY_TIME)
         while time.monotonic() < known:
             time.sleep(_PAUSE)
-        self._take_place(topic, kind)
         self._topic, self._kind = topic, kind
+        self._take_place()
         self._claimed = time.monotonic()
         if self._timer is not None:
             self._timer.reset()
@@ -67,19 +67,19 @@ class GraphGuard:
                 _LOOK_PERIOD, self._look_again, clock=self._node.steady_clock
             )
 
-    def _take_place(self, topic: str, kind: str) -> None:
+    def _take_place(self) -> None:
         """Where it is taken, wait for discovery to tell by whom, or for that one to end."""
-        name = f'{self._node.context.get_domain_id()} {self._node.resolve_topic_name(topic)}'
+        name = f'{self._node.context.get_domain_id()} {self._node.resolve_topic_name(self._topic)}'
         until = time.monotonic() + _PROBATION
         while True:
             over = time.monotonic() > until
-            publishers = self._node.get_publishers_info_by_topic(topic)
+            publishers = self._node.get_publishers_info_by_topic(self._topic)
             if publishers and (over or publishers[0].node_name != _NAMELESS):
-                raise NodeError(self._taken(topic, kind, publishers[0]))
+                raise NodeError(self._taken(publishers[0]))
             if not publishers and self._place.take(name):
                 return
             if over:
-                raise NodeError(self._taken(topic, kind))
+                raise NodeError(self._taken())
             time.sleep(_PAUSE)
 
     def release(self) -> None:
@@ -93,7 +93,7 @@ class GraphGuard:
             own = self._node.get_name(), self._node.get_namespace()
             others = (p for p in publishers if (p.node_name, p.node_namespace) != own)
             another = next(others, publishers[0])  # of the same name
-            self._node.fail(self._taken(self._topic, self._kind, another))
+            self._node.fail(self._taken(another))
         return len(publishers) <= 1
 
     def on_probation(self) -> bool:
@@ -106,15 +106,16 @@ class GraphGuard:
         if self._timer is not None and not self.on_probation():
             self._timer.cancel()
 
-    def _taken(self, topic: str, kind: str, who: TopicEndpointInfo | None = None) -> str:
+    def _taken(self, who: TopicEndpointInfo | None = None) -> str:
         whom = 'a process on this machine'
         if who is not None and who.node_name == _NAMELESS:
             whom = 'a node whose name is not discovered yet'
         elif who is not None:
             whom = f"'{who.node_namespace.rstrip('/')}/{who.node_name}'"
         return (
-            f'{self._node.resolve_topic_name(topic)} is already published by {whom}: there is'
-            f' another {kind} on this graph; stop it, or use another namespace or ROS_DOMAIN_ID'
+            f'{self._node.resolve_topic_name(self._topic)} is already published by {whom}: there is'
+            f' another {self._kind} on this graph; stop it, or use another namespace or'
+            ' ROS_DOMAIN_ID'
         )
 
 

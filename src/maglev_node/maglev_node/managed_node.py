@@ -72,7 +72,9 @@ class ManagedNode(LifecycleNodeMixin, MaglevNode[P]):
         """Bring itself up where that is wanted, then serve the graph."""
         if self.parameters.autostart:
             self._bringing_up = True
-            self._demand(self.trigger_configure())
+            if self.trigger_configure() != TransitionCallbackReturn.SUCCESS:
+                assert self._refusal is not None
+                raise self._refusal
             gc.collect()
             gc.freeze()
             self._start = self.create_timer(1e-3, self._autostart, clock=self.steady_clock)
@@ -86,11 +88,6 @@ class ManagedNode(LifecycleNodeMixin, MaglevNode[P]):
         if due and self.trigger_activate() != TransitionCallbackReturn.SUCCESS:
             self.fail(str(self._refusal))
         self._bringing_up = False
-
-    def _demand(self, result: TransitionCallbackReturn) -> None:
-        if result != TransitionCallbackReturn.SUCCESS:
-            assert self._refusal is not None
-            raise self._refusal
 
     def _on_change_state(self, request: Any, response: Any) -> Any:
         """As rclpy, which ends a node that is asked for what does not begin in its state."""

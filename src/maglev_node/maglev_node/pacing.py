@@ -1,13 +1,13 @@
 """When samples are taken in real time: by the stage's own clock, or by absolute deadlines.
 
-A tick takes a first sample, further ones while :meth:`Pace.again` says so, and then waits.
+A tick takes a first sample, further ones while ``again`` says so, and then waits. Samples are
+given by their sequence numbers, times are in s.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Protocol
 
 _EARLY = 0.7
 """Share of a sample time after which the node waits in the stage for its clock."""
@@ -17,35 +17,11 @@ _SHORTEST_WAIT = 5e-5  # [s]
 _CATCH_UP = 20  # samples in one tick, at most
 
 
-class Pace(Protocol):
-    """Decides when a stage's samples are taken; numbers of samples are sequence numbers."""
-
-    @property
-    def period(self) -> float:
-        """Time from one tick to the next, unless :meth:`wait` says otherwise [s]."""
-        ...
-
-    def start(self, sequence: int) -> None:
-        """The first sample has been taken now."""
-        ...
-
-    def behind(self, sequence: int) -> float:
-        """A tick begins at that newest sample: how far it is behind the clock [s]."""
-        ...
-
-    def again(self, sequence: int, taken: int, late: float) -> bool:
-        """Whether a tick that has ``taken`` samples takes another; the newest came ``late`` [s]."""
-        ...
-
-    def wait(self, passed: float) -> float | None:
-        """How long until the next tick [s], when so long has passed since the newest was due."""
-        ...
-
-
 class StageClock:
     """For a stage that waits for a clock of its own when it is read.
 
-    A tick comes a little before the stage's, so that the graph is served until then.
+    A tick comes a little before the stage's, so that the graph is served until then. ``period`` is
+    from one tick to the next, unless :meth:`wait` says otherwise.
     """
 
     def __init__(self, sample_time: float) -> None:
@@ -53,18 +29,24 @@ class StageClock:
         self.period = _EARLY * sample_time
 
     def start(self, sequence: int) -> None:
-        """Nothing to remember."""
+        """The first sample has been taken now: nothing to remember."""
 
     def behind(self, sequence: int) -> float:
-        """Only the stage can tell."""
+        """How far that newest sample is behind the clock as a tick begins: only the stage knows."""
         return 0.0
 
     def again(self, sequence: int, taken: int, late: float) -> bool:
-        """While the next sample waits already."""
+        """Whether a tick that has ``taken`` samples, the newest ``late``, takes another.
+
+        While that one waits already.
+        """
         return taken < _CATCH_UP and late >= self._sample_time
 
     def wait(self, passed: float) -> float:
-        """Until a little before the next sample."""
+        """How long until the next tick, when so long has passed since the newest sample was due.
+
+        Until a little before the next one.
+        """
         return max(self.period - passed, _SHORTEST_WAIT)
 
 
@@ -97,3 +79,6 @@ class Deadlines:
 
     def wait(self, passed: float) -> None:
         """The timer's period is right as it is."""
+
+
+Pace = StageClock | Deadlines

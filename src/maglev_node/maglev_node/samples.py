@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from numpy.typing import ArrayLike
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
@@ -17,28 +16,16 @@ from maglev_node.topics import KEYS, PROGRESS_PERIOD, SAMPLE_TOPICS, sample_qos,
 _FRAME = 'stage'
 
 
-class SampleWriter:
+class SampleWriter(Outgoing):
     """Publishes a sample topic; what is not written before is as in the message before."""
 
     def __init__(self, node: Node, topic: str, qos: QoSProfile) -> None:
-        self._message = Outgoing(KEYS[topic], _FRAME)
+        super().__init__(KEYS[topic], _FRAME)
         self.publisher = node.create_publisher(SAMPLE_TOPICS[topic], topic, qos)
-
-    def __setitem__(self, field: str, value: ArrayLike) -> None:
-        """Write a field. Raises KeyError for none of the message's, ValueError for the shape."""
-        self._message[field] = value
-
-    def set_stamp(self, nanoseconds: int) -> None:
-        """Write the header's stamp [ns since the epoch]."""
-        self._message.set_stamp(nanoseconds)
 
     def publish(self) -> None:
         """Publish the message as it is now."""
         self.publisher.publish(self.serialized())
-
-    def serialized(self) -> bytes:
-        """The message as it is now."""
-        return self._message.serialized()
 
 
 class ProgressWriter:
@@ -76,9 +63,7 @@ class SampleReader:
             return None
 
 
-def hear(
-    node: Node, topic: str, callback: Callable[[Any], None], qos: QoSProfile | None = None
-) -> Subscription[Any]:
+def hear(node: Node, topic: str, callback: Callable[[Any], None]) -> Subscription[Any]:
     """Subscribe to a sample topic: ``callback`` is called with what :class:`SampleReader` reads.
 
     The subscription is of serialized messages, and so is its own callback.
@@ -90,30 +75,22 @@ def hear(
         if sample is not None:
             callback(sample)
 
-    return node.create_subscription(
-        SAMPLE_TOPICS[topic], topic, take, qos or sample_qos(), raw=True
-    )
+    return node.create_subscription(SAMPLE_TOPICS[topic], topic, take, sample_qos(), raw=True)
 
 
 class SampleQueue:
-    """A topic of samples, or of their progress, whose messages wait until they are taken."""
+    """A topic of samples, or of their progress, whose messages wait until they are taken.
+
+    ``raw`` is the queue of the serialized messages.
+    """
 
     def __init__(self, node: PollingNode, topic: str, qos: QoSProfile | None = None) -> None:
-        self._queue = node.poll(topic, SAMPLE_TOPICS[sampled(topic)], qos, raw=True)
+        self.raw = node.poll(topic, SAMPLE_TOPICS[sampled(topic)], qos, raw=True)
         self._reader = SampleReader(node, topic)
-        self.topic = self._queue.topic
 
     def take(self, at_most: int = 100_000) -> Iterator[Any]:
         """What waits, oldest first, as :class:`SampleReader` reads it."""
-        for message, _ in self._queue.take(at_most):
+        for message, _ in self.raw.take(at_most):
             sample = self._reader.read(message)
             if sample is not None:
                 yield sample
-
-    def publisher_count(self) -> int:
-        """How many publishers the topic has."""
-        return self._queue.publisher_count()
-
-    def destroy(self) -> None:
-        """Give the queue up."""
-        self._queue.destroy()

@@ -95,7 +95,7 @@ class Sampling(Generic[P, S]):
         if self._answers is not None:
             self._node.destroy_subscription(self._answers)
         else:
-            self._currents.destroy()
+            self._currents.raw.destroy()
 
     def land(self, why: str) -> None:
         """Land, publishing every sample, and be done with it."""

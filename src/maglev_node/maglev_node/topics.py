@@ -65,9 +65,6 @@ def reference_qos(depth: int = KEPT['lockstep']) -> QoSProfile:
 
     The reference may see the controller before that sees the reference.
     """
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST,
-        depth=depth,
-        reliability=ReliabilityPolicy.RELIABLE,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL,
-    )
+    profile = sample_qos(depth)
+    profile.durability = DurabilityPolicy.TRANSIENT_LOCAL
+    return profile

@@ -49,8 +49,9 @@ class Through:
         knots = _knots(points, columns, hover)
         if len(knots.time) == 1:
             raise UnreachableError('the trajectory has no point after its start')
-        _check_end(State(*(values[-1] for values in knots.state)), knots.time[-1])
-        self._end = knots.state.position[-1]
+        end = State(*(values[-1] for values in knots.state))
+        _check_still(end, knots.time[-1], 'it must end at rest')
+        self._end = end.position
         self._starts, self._durations = knots.time[:-1], np.diff(knots.time)
         self._coefficients = _coefficients(knots)
         self.length = float(knots.time[-1])
@@ -164,18 +165,15 @@ def _check_start(state: State, hover: FloatArray) -> None:
             f'{AXES[axis]} is {state.position[axis]:.6g} {UNITS[axis]} at 0 s, it must begin where '
             f'the reference hovers, at {hover[axis]:.6g} {UNITS[axis]}'
         )
-    for values, name in zip(state[1:], State._fields[1:], strict=True):
-        if values.any():
-            axis = int(np.argmax(np.abs(values)))
-            raise UnreachableError(f'{name} of {AXES[axis]} is {values[axis]:g} at 0 s, not 0')
+    _check_still(state, 0.0, 'not 0')
 
 
-def _check_end(state: State, time: float) -> None:
+def _check_still(state: State, time: float, must: str) -> None:
     for values, name in zip(state[1:], State._fields[1:], strict=True):
-        if values.any():
-            axis = int(np.argmax(np.abs(values)))
+        axis = int(np.argmax(np.abs(values)))
+        if values[axis] != 0.0:
             raise UnreachableError(
-                f'{name} of {AXES[axis]} is {values[axis]:g} at {time:g} s, it must end at rest'
+                f'{name} of {AXES[axis]} is {values[axis]:g} at {time:g} s, {must}'
             )
 
 

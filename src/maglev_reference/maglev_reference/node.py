@@ -187,11 +187,11 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         if missing:
             where = self._message.publisher.topic_name
             return f'waiting for {", ".join(missing)} to subscribe to {where}'
-        if self._measurements.publisher_count() == 0:
-            return f'waiting for a stage on {self._measurements.topic}'
+        if self._measurements.raw.publisher_count() == 0:
+            return f'waiting for a stage on {self._measurements.raw.topic}'
         if self._flown:
             return 'waiting for the stage to come to rest'
-        return f'waiting for a controller on {self._states.topic}'
+        return f'waiting for a controller on {self._states.raw.topic}'
 
     def _position(self) -> FloatArray:
         """The outputs (5,) [m, rad] that were measured last."""
@@ -206,7 +206,8 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         try:
             timeline = self._run.plan(self._position())
         except UnreachableError as error:
-            self._refuse(str(error))
+            if not self._graph.on_probation():  # or another, not discovered yet, may be flying it
+                self.fail(str(error))
             return
         self._take_measurement()
         if self._run.autostart != autostart:  # the stage began anew in the meantime
@@ -215,11 +216,6 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         self._reminded = time.monotonic()
         start = 'starting' if autostart else 'resting until ~/lift_off'
         self.get_logger().info(f'{start} at sample {self._run.newest}')
-
-    def _refuse(self, message: str) -> None:
-        """Fail; but while another reference may yet be discovered, it may be flying the platen."""
-        if not self._graph.on_probation():
-            self.fail(message)
 
     def _give_way(self) -> None:
         """Leave the run when the controller does not follow."""
@@ -237,7 +233,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         _, calls = self._run.obstacle()
         publishers = self.get_publishers_info_by_topic(CONTROLLER_PROGRESS)
         if not publishers:
-            return f'{reason}: nobody publishes {self._states.topic}'
+            return f'{reason}: nobody publishes {self._states.raw.topic}'
         who = f'{publishers[0].node_namespace.rstrip("/")}/{publishers[0].node_name}'
         services = [f'{who}/{call}' for call in calls]
         services.append(self.resolve_service_name('~/lift_off'))
@@ -285,7 +281,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
                 self._end()
             return
         who = 'the stage, or the controller it waits for, has stopped'
-        if self._measurements.publisher_count() == 0:
+        if self._measurements.raw.publisher_count() == 0:
             who = 'the stage is gone'
         self.fail(f'no measurement for {silent:.1f} s after sample {self._run.newest}: {who}')
 
