@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from retuning import retuned
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
@@ -80,7 +81,7 @@ def test_w_does_not_jump_and_the_flight_goes_on(name: str) -> None:
     for plant, error in (('ideal.yaml', 4e-5), ('benchmark.yaml', 6e-5)):
         old, flying = Regulator(ControllerParameters()), stage(plant, before)
         run(old, flying, before)
-        new = old.retuned(replace(old.parameters, CHANGES[name]))
+        new = retuned(old, replace(old.parameters, CHANGES[name]))
         wanted = virtual_inputs([old, new], flying, first)
         difference = np.abs(wanted[0, 0] - wanted[0, 1])
         steps = np.abs(np.diff(wanted[:, 1], axis=0)).max(axis=0)
@@ -97,7 +98,7 @@ def test_the_share_that_fades_is_gone_soon() -> None:
     before, after = ellipse(0, 3000), ellipse(3000, 400)
     old, flying = Regulator(ControllerParameters()), stage('ideal.yaml', before)
     run(old, flying, before)
-    new = old.retuned(replace(old.parameters, {'feed_forward': False}))
+    new = retuned(old, replace(old.parameters, {'feed_forward': False}))
     first = np.abs(new.arrays.axes['bump']).max()
     run(new, flying, after)
     assert first > 0.1
@@ -110,7 +111,7 @@ def test_back_to_the_derivative_filter_and_forth() -> None:
     regulator, flying = Regulator(ControllerParameters()), stage('ideal.yaml', before)
     run(regulator, flying, before)
     for part, choice in enumerate(('derivative', 'observer', 'derivative'), start=3):
-        regulator = regulator.retuned(replace(regulator.parameters, {'rate_estimate': choice}))
+        regulator = retuned(regulator, replace(regulator.parameters, {'rate_estimate': choice}))
         piece = ellipse(1000 * part, 1000)
         outcome = run(regulator, flying, piece)
         assert np.abs(outcome.output - piece.position).max() < 4e-5
@@ -119,7 +120,7 @@ def test_back_to_the_derivative_filter_and_forth() -> None:
 def test_on_the_ground_there_is_nothing_to_take_over() -> None:
     """Before the first sample a retuned regulator is a new one."""
     old = Regulator(ControllerParameters())
-    new = old.retuned(replace(old.parameters, {'y.bandwidth': 180.0}))
+    new = retuned(old, replace(old.parameters, {'y.bandwidth': 180.0}))
     fresh = Regulator(new.parameters)
     for kept, begun in zip(new.save(), fresh.save(), strict=True):
         np.testing.assert_array_equal(kept, begun)
@@ -147,6 +148,6 @@ def test_what_cannot_be_is_refused_and_changes_nothing(
     run(old, flying, before)
     saved = old.save()
     with pytest.raises(ParameterError, match=reason):
-        old.retuned(replace(old.parameters, change))
+        retuned(old, replace(old.parameters, change))
     for kept, after in zip(saved, old.save(), strict=True):
         np.testing.assert_array_equal(after, kept)

@@ -69,23 +69,26 @@ def carry_over(old: ControlArrays, new: ControlArrays, maps: ModelMaps) -> None:
         _settle_notches(new, axis)
 
 
-def _wanted(arrays: ControlArrays, axis: int) -> float:
-    """w but for the bump, by the last sample's error and rate and ξ as it is now."""
-    settings, state = arrays.settings, arrays.axes[axis]
-    model_part = float(arrays.models['output'][axis] @ arrays.xi[axis])
+def _feedback(arrays: ControlArrays, axis: int) -> float:
+    """What notches filter of w, by the last sample's error and rate and ξ as it is now."""
+    settings, error = arrays.settings, arrays.axes[axis]['error']
     rate = arrays.sample['error_rate'][axis]
+    value = settings['error_gain'][axis] * error + settings['rate_gain'][axis] * rate
+    return float(value) + float(arrays.models['output'][axis] @ arrays.xi[axis])
+
+
+def _wanted(arrays: ControlArrays, axis: int) -> float:
+    """w but for the bump, likewise."""
+    settings, state = arrays.settings, arrays.axes[axis]
     ahead = float(settings['feed_forward'] * state['reference_acceleration'])
-    feedback = settings['error_gain'][axis] * state['error'] + settings['rate_gain'][axis] * rate
     friction = state['friction'] * state['bristle'] if settings['friction_gain'] > 0.0 else 0.0
-    return float(feedback) + model_part + ahead + float(friction)
+    return _feedback(arrays, axis) + ahead + float(friction)
 
 
 def _settle_notches(arrays: ControlArrays, axis: int) -> None:
     """Notches as they are after the last sample's feedback has been held for long."""
     settings, state = arrays.settings, arrays.axes[axis]
-    rate = arrays.sample['error_rate'][axis]
-    value = settings['error_gain'][axis] * state['error'] + settings['rate_gain'][axis] * rate
-    value += float(arrays.models['output'][axis] @ arrays.xi[axis])
+    value = _feedback(arrays, axis)
     for k in range(int(settings['notches'][axis])):
         b_0, _, b_2, _, a_2 = settings['notch'][axis, k]
         state['notch'][k] = (1.0 - b_0) * value, (b_2 - a_2) * value

@@ -201,21 +201,18 @@ class IterativeLearning:
         except (OSError, EOFError, KeyError, ValueError, TypeError, BadZipFile) as error:
             text = f"parameter 'learning.file': cannot read {path}: {error}"
             raise ParameterError(text) from error
-        wanted = self.table
+        wanted, limit, wrong = self.table, self.arrays.state[0]['limit'], ''
         if sample_time != self._sample_time or table.shape != wanted.shape:
-            raise ParameterError(
-                f"parameter 'learning.file': {path} holds {table.shape} values every "
-                f'{sample_time:g} s, the period is {wanted.shape} every {self._sample_time:g} s'
+            wrong = (
+                f'holds {table.shape} values every {sample_time:g} s, the period is {wanted.shape} '
+                f'every {self._sample_time:g} s'
             )
-        if start.shape not in ((0, 5), (2, 5)) or start.dtype != np.float64:
-            text = f"parameter 'learning.file': {path} does not say where its period begins"
-            raise ParameterError(text)
-        limit = self.arrays.state[0]['limit']
-        if not (table.dtype == np.float64 and np.all(np.abs(table) <= limit)):
-            raise ParameterError(
-                f"parameter 'learning.file': {path} holds what is not finite, or above "
-                f"'learning.largest' ({limit.tolist()})"
-            )
+        elif start.shape not in ((0, 5), (2, 5)) or start.dtype != np.float64:
+            wrong = 'does not say where its period begins'
+        elif not (table.dtype == np.float64 and np.all(np.abs(table) <= limit)):
+            wrong = f"holds what is not finite, or above 'learning.largest' ({limit.tolist()})"
+        if wrong:
+            raise ParameterError(f"parameter 'learning.file': {path} {wrong}")
         wanted[:], self._start = table, start
 
 
@@ -274,7 +271,7 @@ def _check(parameters: ControllerParameters, samples: int, reach: int) -> None:
     counts = period / sample_time * np.arange(1, 1001)
     whole = np.flatnonzero(np.abs(counts - np.round(counts)) < _WHOLE)
     if not whole.size or whole[0] > 0:
-        fits = f'{whole.size and period * (whole[0] + 1):g} s are' if whole.size else 'none is'
+        fits = f'{period * (whole[0] + 1):g} s are' if whole.size else 'none is'
         raise ParameterError(
             f"parameter 'learning.period' is {period:g} s, {period / sample_time:g} samples, it "
             f'must be whole samples; of its multiples {fits}'

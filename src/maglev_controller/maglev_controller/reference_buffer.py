@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from maglev_model.axes import FloatArray
+
 
 class ReferenceBuffer:
     """Holds the newest ``capacity`` references in a ring; a sample number is its own place.
@@ -20,9 +22,9 @@ class ReferenceBuffer:
         self.sequence: NDArray[np.int64] = np.full(capacity, -1, dtype=np.int64)
         self.phase: NDArray[np.uint8] = np.zeros(capacity, dtype=np.uint8)
         self.segment: NDArray[np.int64] = np.zeros(capacity, dtype=np.int64)
-        self.position: NDArray[np.float64] = np.zeros((capacity, 5))
-        self.velocity: NDArray[np.float64] = np.zeros((capacity, 5))
-        self.acceleration: NDArray[np.float64] = np.zeros((capacity, 5))
+        self.position: FloatArray = np.zeros((capacity, 5))
+        self.velocity: FloatArray = np.zeros((capacity, 5))
+        self.acceleration: FloatArray = np.zeros((capacity, 5))
         self.newest = -1
         self.session = 0
         self.renewed = False
@@ -64,6 +66,10 @@ class ReferenceBuffer:
         self.velocity[row] = velocity
         self.acceleration[row] = acceleration
         self.newest, self.session = sequence, session
+
+    def at(self, row: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Position, velocity and acceleration (5,) of a row."""
+        return self.position[row], self.velocity[row], self.acceleration[row]
 
     def find(self, sequence: int) -> int:
         """The row of a sample's reference, -1 when it has not arrived or is forgotten."""

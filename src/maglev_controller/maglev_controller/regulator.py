@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maglev_controller.bumpless_transfer import ModelMaps, carry_over, check_retuning, model_maps
+from maglev_controller.bumpless_transfer import ModelMaps, carry_over, check_retuning
 from maglev_controller.checks import check_foreign
 from maglev_controller.design.axis_design import AxisDesign
 from maglev_controller.design.margins import LoopMargins, all_margins, check_margins
@@ -25,20 +25,17 @@ from maglev_controller.design.observer import NO_OBSERVER
 from maglev_controller.foreign_law import ForeignLaw, Law
 from maglev_controller.laws import control_law, find_law
 from maglev_controller.parameters import ControllerParameters
-from maglev_controller.stage_parameters import EncoderParameters
 from maglev_controller.step.arrays import (
     AXIS,
     INVERSES,
     MODEL,
     RECORDS,
     SAMPLE,
-    SETTINGS,
     ControlArrays,
 )
 from maglev_controller.step.estimation import DOUBT
 from maglev_controller.step.foreign_sample import (
     TOLD,
-    close_by_itself,
     close_with_currents,
     close_with_input,
     open_sample,
@@ -154,25 +151,13 @@ class Regulator:
         if self.foreign is not None and not self.foreign.fault:
             self.foreign.fault = reason
 
-    def retuned(self, parameters: ControllerParameters) -> Regulator:
-        """A regulator with other parameters that goes on in flight where this one is.
+    def take_over(self, previous: Regulator, maps: ModelMaps) -> None:
+        """Go on in flight where ``previous`` is, without a jump of w, in a fraction of a sample.
 
-        This one stays as it is, to be replaced between two steps. Raises ``ParameterError`` for
-        what cannot be had, and for what cannot change in flight.
+        ``maps`` are those that :func:`~maglev_controller.bumpless_transfer.model_maps` makes of the
+        two. Raises ``ParameterError`` for what cannot change in flight.
         """
-        check_retuning(self.parameters, parameters)
-        successor = Regulator(parameters)
-        successor.take_over(self)
-        return successor
-
-    def take_over(self, previous: Regulator, maps: ModelMaps | None = None) -> None:
-        """Go on where ``previous`` is, without a jump of w; both designed for the same stage.
-
-        With ``maps``, which :func:`~maglev_controller.bumpless_transfer.model_maps` makes of the
-        two, it is done within a fraction of a sample.
-        """
-        if maps is None:
-            maps = model_maps(previous.arrays, self._arrays)
+        check_retuning(previous.parameters, self.parameters)
         carry_over(previous.arrays, self._arrays, maps)
         self.foreign = previous.foreign
         if self.foreign is not None:
@@ -262,12 +247,11 @@ class Regulator:
             direct[:] = quadrature[:] = 0.0
             raise MeasurementFault(self.describe(code, gap, x, z))
         answer = law.ask(gap, x, z, told)
-        if answer is None:
-            return close_by_itself(*self._arrays, direct, quadrature)
-        if law.gives_currents:
+        if answer is not None and law.gives_currents:
             direct[:], quadrature[:] = answer
             return close_with_currents(*self._arrays, direct, quadrature)
-        return close_with_input(*self._arrays, answer, direct, quadrature)
+        wanted = self.virtual_input if answer is None else answer
+        return close_with_input(*self._arrays, wanted, direct, quadrature)
 
     def describe(self, code: int, gap: FloatArray, x: float, z: float) -> str:
         """What a fault code of ``control_step`` means for the measurement it came from."""
@@ -298,19 +282,16 @@ def _control_arrays(
 ) -> ControlArrays:
     states = max(1, *(design.order for design in designs))
     records = np.zeros(1, RECORDS)
-    settings = _settings(parameters, designs)
-    for name in SETTINGS.fields or ():
-        if name in settings:
-            records['settings'][name] = settings[name]
+    for name, value in _settings(parameters, designs).items():
+        records['settings'][name] = value
     for name, value in winding_settings(parameters).items():
         records['settings']['winding'][name] = value
     models, transition = np.zeros((5, states), MODEL), np.zeros((5, states, states))
     for index, design in enumerate(designs):
         n = design.order
-        number = len(design.notches)
-        records['settings']['notches'][0, index] = number
-        if number:
-            records['settings']['notch'][0, index, :number] = design.notches
+        records['settings']['notches'][0, index] = len(design.notches)
+        for k, notch in enumerate(design.notches):
+            records['settings']['notch'][0, index, k] = notch
         models['output'][index, :n] = design.gain[2:]
         models['drive'][index, :n] = design.drive
         models['antiwindup'][index, :n] = design.antiwindup
@@ -322,12 +303,7 @@ def _control_arrays(
             if there.size:
                 models['first'][index, row] = there[0]
                 models['end'][index, row] = there[-1] + 1
-    return ControlArrays(
-        records=records,
-        models=models,
-        transition=transition,
-        xi=np.zeros((5, states)),
-    )
+    return ControlArrays(records, models, transition, xi=np.zeros((5, states)))
 
 
 def _settings(
@@ -375,23 +351,17 @@ def _settings(
         'rest_fades': any(design.fades for design in designs),
         'doubt': DOUBT if any(design.fades for design in designs) else 0.0,
         'waking': -math.expm1(-parameters.sample_time / REST_FADING_TIME),
-        **_counts(parameters.encoder),
-        **_friction(parameters),
+        **_counts_and_friction(parameters),
     }
 
 
-def _counts(encoder: EncoderParameters) -> dict[str, ArrayLike]:
+def _counts_and_friction(parameters: ControllerParameters) -> dict[str, ArrayLike]:
+    encoder, friction = parameters.encoder, parameters.friction
+    time = friction.adaptation_time
     return {
         'half_gap': 0.5 * encoder.gap_resolution,
         'half_horizontal': 0.5 * encoder.horizontal_resolution,
         'floored': encoder.rounding == 'floor',
-    }
-
-
-def _friction(parameters: ControllerParameters) -> dict[str, ArrayLike]:
-    friction = parameters.friction
-    time = friction.adaptation_time
-    return {
         'friction_gain': -math.expm1(-parameters.sample_time / time) if time > 0.0 else 0.0,
         'friction_way': friction.way,
         'friction_limit': friction.largest,

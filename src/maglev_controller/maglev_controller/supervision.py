@@ -22,6 +22,9 @@ _CATCH_UP = 0.3  # time a landing has to bring back a platen that did not follow
 _LATE = 0.02  # the rest before a lift-off that is followed is over by, at most [s]
 _FLYING_MARGIN = 5e-4  # above the lower stop, beyond encoder and stop compliance [m]
 
+Wanted = tuple[FloatArray, FloatArray, FloatArray]
+"""Position, velocity and acceleration of one sample's reference, (5,) each [m, rad]."""
+
 
 class Supervisor:
     """Runs the regulator when it should run, and sees to it that no current flows otherwise.
@@ -69,11 +72,11 @@ class Supervisor:
 
     def _warm_up(self) -> None:
         """Compile, or load what was compiled, before the first sample asks for it."""
-        rest = np.array([self._lower_stop, 0.0, 0.0, 0.0, 0.0])
-        self._regulate(np.full(4, self._lower_stop), 0.0, 0.0, rest, np.zeros(5), np.zeros(5))
-        Landing(self.parameters, rest, np.zeros(5), np.zeros(5)).step()
-        self._watch_following(rest, np.zeros(5))
-        self._reach.fault(rest, np.zeros(5), np.zeros(5))
+        rest = np.array([self._lower_stop, 0.0, 0.0, 0.0, 0.0]), np.zeros(5), np.zeros(5)
+        self._regulate(np.full(4, self._lower_stop), 0.0, 0.0, rest)
+        Landing(self.parameters, *rest).step()
+        self._watch_following(rest)
+        self._reach.fault(*rest)
         self._start_afresh()
         self._no_current()
 
@@ -105,7 +108,6 @@ class Supervisor:
         somebody else's law cannot be made.
         """
         if self.flying:
-            check_retuning(self.parameters, regulator.parameters)
             regulator.take_over(self.regulator, maps)
         else:
             regulator.make_foreign()
@@ -232,8 +234,7 @@ class Supervisor:
             self.mode = Mode.WAITING
 
     def _follow(self, row: int, gap: FloatArray, x: float, z: float) -> None:
-        references = self.references
-        wanted = references.position[row], references.velocity[row], references.acceleration[row]
+        references, wanted = self.references, self.references.at(row)
         fault = self._reach.fault(*wanted)
         if fault:
             self._refuse_reference(fault, gap, x, z)
@@ -245,10 +246,10 @@ class Supervisor:
             if restart and phase == Phase.STEP:
                 self.regulator.reset(in_flight=True)
         self._row = row
-        self._regulate(gap, x, z, *wanted, phase == Phase.TRACK)
+        self._regulate(gap, x, z, wanted, measured=phase == Phase.TRACK)
         if self.regulator.fault and self.mode == Mode.REGULATING:
             self.stop(self.regulator.fault)
-        self._watch_following(*wanted[:2])
+        self._watch_following(wanted)
 
     def _refuse_reference(self, fault: str, gap: FloatArray, x: float, z: float) -> None:
         """Land from where the last one was that could be followed; not to lift off is enough."""
@@ -260,11 +261,12 @@ class Supervisor:
         else:
             self._no_current()
 
-    def _watch_following(self, position: FloatArray, velocity: FloatArray) -> None:
+    def _watch_following(self, reference: Wanted) -> None:
         """Give up a platen that does not follow: whoever lands it should not rely on this law.
 
         A law of somebody else's is followed by the controller's own first.
         """
+        position, velocity, _ = reference
         failed = self._following_watch.step(position, velocity, self.regulator.error)
         if not failed or not self.flying:
             return
@@ -274,49 +276,29 @@ class Supervisor:
             self.give_up(failed)
 
     def _land(self, reason: str) -> None:
-        references, row = self.references, self._row
         self.regulator.fall_back(reason)
         self._following_watch.reset(_CATCH_UP)
         self.mode, self.reason, self._after_landing = Mode.LANDING, reason, Mode.DISABLED
-        self._landing = Landing(
-            self.parameters,
-            references.position[row],
-            references.velocity[row],
-            references.acceleration[row],
-        )
+        self._landing = Landing(self.parameters, *self.references.at(self._row))
 
     def _descend(self, gap: FloatArray, x: float, z: float) -> None:
         assert self._landing is not None
-        position, velocity, acceleration = self._landing.step()
+        wanted = self._landing.step()
         if self._landing.done:
             self.mode, self.reason = self._after_landing, f'landed: {self.reason}'
             self._no_current()
         else:
-            self._regulate(gap, x, z, position, velocity, acceleration)
-            self._watch_following(position, velocity)
+            self._regulate(gap, x, z, wanted)
+            self._watch_following(wanted)
 
     def _regulate(
-        self,
-        gap: FloatArray,
-        x: float,
-        z: float,
-        position: FloatArray,
-        velocity: FloatArray,
-        acceleration: FloatArray,
-        measured: bool = False,
+        self, gap: FloatArray, x: float, z: float, reference: Wanted, measured: bool = False
     ) -> None:
         if self.learning is not None:
-            self.learning.look_ahead(self.regulator.arrays, measured, position, velocity)
+            self.learning.look_ahead(self.regulator.arrays, measured, *reference[:2])
         try:
             self.limited_by = self.regulator.step(
-                gap,
-                x,
-                z,
-                position,
-                velocity,
-                acceleration,
-                self.direct_current,
-                self.quadrature_current,
+                gap, x, z, *reference, self.direct_current, self.quadrature_current
             )
         except MeasurementFault as fault:
             self.give_up(str(fault))

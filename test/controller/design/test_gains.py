@@ -14,13 +14,12 @@ from maglev_controller.design.gains import (
     augmented,
     augmented_discrete,
     bandwidth_weights,
-    closed_loop_poles,
     dlqr,
     lqr,
     place,
     split_phase,
 )
-from maglev_controller.design.internal_model import internal_model
+from maglev_controller.design.internal_model import InternalModel, internal_model
 from maglev_controller.laws.output_regulator import design as design_axis
 from maglev_controller.parameters import ControllerParameters
 from maglev_model.parameters import ParameterError, build
@@ -59,6 +58,12 @@ def axis_parameters(**overrides: object) -> ControllerParameters:
         ControllerParameters,
         {k.replace('__', '.') if '__' in k else f'y.{k}': v for k, v in overrides.items()},
     )
+
+
+def closed_loop_poles(model: InternalModel, gain: np.ndarray) -> np.ndarray:
+    """Poles of the continuous closed loop of (13), (14), (16)."""
+    state, drive = augmented(model)
+    return np.linalg.eigvals(state + np.outer(drive, gain))
 
 
 @pytest.mark.parametrize('axis', list(LQR))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from retuning import retuned
 from supervised import STANDING, STOP, lead
 
 from maglev_controller.parameters import ControllerParameters
@@ -75,10 +76,8 @@ def test_a_voltage_that_is_given_in_flight_finds_the_currents_that_flow(voltage:
     stage = SimulatedStage(build(PlantParameters, {'initial.position': tuple(NEAR)}))
     old = Regulator(build(ControllerParameters, {'winding.voltage': voltage}))
     before = run(old, stage, references).direct_current[-1]
-    new, currents = (
-        old.retuned(replace(old.parameters, {'winding.voltage': 15.0})),
-        np.empty((2, 4)),
-    )
+    new = retuned(old, replace(old.parameters, {'winding.voltage': 15.0}))
+    currents = np.empty((2, 4))
     new.step(*stage.read(), *(column[0] for column in references), *currents)
     assert before.min() > 0.9
     np.testing.assert_allclose(currents[0], before, atol=0.01)

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.linalg import LinAlgError, solve_continuous_are, solve_discrete_are
 
-from maglev_controller.design.internal_model import InternalModel
+from maglev_controller.design.internal_model import InternalModel, polynomial
 from maglev_controller.design.state_space import ComplexArray, discretise
 from maglev_model.axes import FloatArray
 from maglev_model.parameters import ParameterError
@@ -97,7 +97,9 @@ def place(model: InternalModel, poles: ComplexArray, axis: str = 'axis') -> Floa
     if model.form == 'companion':
         wanted = np.real(np.poly(poles))
         quadratic = np.array([1.0, -total[1], -total[0]])
-        numerator: FloatArray = np.polysub(np.polymul(quadratic, model.polynomial()), wanted)
+        numerator: FloatArray = np.polysub(
+            np.polymul(quadratic, polynomial(model.frequencies)), wanted
+        )
         total[2:] = numerator[::-1][: model.order]
     else:
         total[2:] = _modal_gains(model, poles)
@@ -200,31 +202,22 @@ def _cost(model: InternalModel, weights: Weights, axis: str) -> tuple[FloatArray
 
 def _model_weights(model: InternalModel, given: FloatArray, axis: str) -> FloatArray:
     """A weight for each internal-model state, from as many as are given."""
-    each: FloatArray
     modal = model.form == 'modal'
     if given.size == 1:
         return np.full(model.order, float(given[0]))
     if modal and given.size == 2:
-        each = np.where(model.frequencies == 0.0, given[0], given[1])[model.mode]
-        return each
+        given = np.where(model.frequencies == 0.0, given[0], given[1])
     expected = model.frequencies.size if modal else model.order
     if given.size != expected:
         raise ParameterError(
             f"{axis}: 'weight_model' has {given.size} elements, this internal model takes 1"
             f'{", 2" if modal else ""} or {expected}'
         )
-    each = given[model.mode] if modal else given
-    return each
+    return given[model.mode] if modal else given
 
 
 def _no_gain(axis: str, error: Exception) -> ParameterError:
     return ParameterError(f'{axis}: these LQR weights admit no stabilising gain ({error})')
-
-
-def closed_loop_poles(model: InternalModel, gain: FloatArray) -> ComplexArray:
-    """Poles (n + 2,) [rad/s] of the continuous closed loop of (13), (14), (16)."""
-    state, drive = augmented(model)
-    return np.asarray(np.linalg.eigvals(state + np.outer(drive, gain)), dtype=np.complex128)
 
 
 def poles_from(

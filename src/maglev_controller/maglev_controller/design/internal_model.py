@@ -45,13 +45,9 @@ class InternalModel:
         """Which of the states (n,) belong to an oscillator (modal form)."""
         return np.asarray(self.frequencies[self.mode] > 0.0)
 
-    def polynomial(self) -> FloatArray:
-        """The characteristic polynomial d(s), (n + 1,), highest power first."""
-        return polynomial(self.frequencies)
-
 
 def polynomial(frequencies: Sequence[float] | FloatArray) -> FloatArray:
-    """d(s) = Π (s² + ω²), with the factor s for ω = 0, highest power first."""
+    """d(s) = Π (s² + ω²), with the factor s for ω = 0, (n + 1,), highest power first."""
     product = np.ones(1)
     for omega in frequencies:
         factor = np.array([1.0, 0.0]) if omega == 0.0 else np.array([1.0, 0.0, omega**2])
@@ -87,13 +83,10 @@ def _companion(frequencies: FloatArray) -> InternalModel:
     n = coefficients.size - 1
     state = np.eye(n, k=1)
     state[-1:, :] = -coefficients[:0:-1]
-    unit = np.eye(n)
+    drive, output = np.zeros(n), np.zeros(n)
+    drive[-1:], output[:1] = 1.0, 1.0
     mode = np.zeros(n, dtype=np.int64)
-    return InternalModel(frequencies, state, _column(unit, -1), _column(unit, 0), mode, 'companion')
-
-
-def _column(unit: FloatArray, index: int) -> FloatArray:
-    return np.array(unit[:, index]) if unit.size else np.zeros(0)
+    return InternalModel(frequencies, state, drive, output, mode, 'companion')
 
 
 def _modal(frequencies: FloatArray) -> InternalModel:

@@ -24,6 +24,7 @@ from maglev_controller.design.state_space import (
     plant_system,
     response,
     series,
+    spectral_radius,
 )
 from maglev_controller.parameters import ControllerParameters, MarginParameters
 from maglev_controller.step.estimation import DOUBT
@@ -198,7 +199,7 @@ def _friction(design: AxisDesign, period: float, delay: int, designed: int) -> f
     for slope in _SLOPES:
         plant = plant_system(period, delay, stiffness=design.stiffness, friction=slope)
         loops = [closed_loop(controller, plant) for controller in controllers]
-        if max(np.max(np.abs(np.linalg.eigvals(loop))) for loop in loops) >= 1.0:
+        if max(map(spectral_radius, loops)) >= 1.0:
             return float(slope)
     return math.inf
 
@@ -257,8 +258,7 @@ def _unstable_mode(
     for mode in modes:
         for variant in variants((mode,), parameters.modes.tolerance):
             plant = plant_system(period, delay, stiffness=design.stiffness, modes=variant)
-            loop = closed_loop(controller, plant)
-            if variant and np.max(np.abs(np.linalg.eigvals(loop))) >= 1.0:
+            if variant and spectral_radius(closed_loop(controller, plant)) >= 1.0:
                 return mode.frequency
     return math.nan
 

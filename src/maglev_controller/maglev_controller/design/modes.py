@@ -28,8 +28,8 @@ from maglev_controller.design.state_space import (
     plant_system,
     response,
     sampled_frequency,
+    spectral_radius,
 )
-from maglev_model.axes import FloatArray
 
 FACTORS: Final = tuple(0.93**power for power in range(17))
 """Of the three speeds of the axis."""
@@ -166,8 +166,4 @@ class _Grid:
 
     def _stable(self, design: AxisDesign, plants: Sequence[StateSpace]) -> bool:
         controller = controller_system(design, self._case.period, self._case.delay)
-        return all(_radius(closed_loop(controller, plant)) < 1.0 for plant in plants)
-
-
-def _radius(loop: FloatArray) -> float:
-    return float(np.max(np.abs(np.linalg.eigvals(loop))))
+        return all(spectral_radius(closed_loop(controller, plant)) < 1.0 for plant in plants)

@@ -120,6 +120,11 @@ def series(first: StateSpace, second: StateSpace) -> StateSpace:
     )
 
 
+def spectral_radius(loop: FloatArray) -> float:
+    """Largest |z| of the poles of a transition matrix."""
+    return float(np.max(np.abs(np.linalg.eigvals(loop))))
+
+
 def closed_loop(controller: StateSpace, plant: StateSpace) -> FloatArray:
     """The closed loop's transition matrix; state: the plant's, then the controller's."""
     n = plant.input.size

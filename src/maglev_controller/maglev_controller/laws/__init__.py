@@ -33,7 +33,7 @@ from maglev_controller.checks import check_currents, check_foreign, check_learni
 from maglev_controller.design.axis_design import AxisDesign
 from maglev_controller.foreign_law import Law
 from maglev_controller.parameters import ControllerParameters
-from maglev_model.parameters.plugins import find_plugin, names_in, plugin_function
+from maglev_model.parameters.plugins import find_plugin, plugin_function
 
 _LANDS = 'output_regulator'
 
@@ -50,11 +50,6 @@ class ControlLaw:
     has_crossover: bool
     references: tuple[int, ...]
     make: Callable[[ControllerParameters], Law] | None = None
-
-
-def law_names() -> tuple[str, ...]:
-    """The laws of this folder, by name."""
-    return names_in(__name__)
 
 
 def find_law(name: str) -> ControlLaw:

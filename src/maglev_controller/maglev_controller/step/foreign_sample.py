@@ -13,16 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maglev_controller.step.arrays import ControlArrays, Currents, Reading, Reference
-from maglev_controller.step.estimation import surprises
-from maglev_controller.step.sample import (
-    OK,
-    advance_models,
-    currents_of_w,
-    learn,
-    measure,
-    model_parts,
-    virtual_inputs,
-)
+from maglev_controller.step.sample import OK, conclude, currents_of_w, decide
 from maglev_controller.step.voltage import keep_within_voltage
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import borrowing, compiled
@@ -53,12 +44,9 @@ def open_sample(
     settings, sample, axes = records[0].settings, records[0].sample, records[0].axes
     machine = machine_from_array(settings.machine)
     reading, reference = Reading(gap, x, z), Reference(position, velocity, acceleration)
-    code = measure(settings, machine, sample, reading, reference)
+    code = decide(ControlArrays(records, models, transition, xi), machine, reading, reference)
     if code != OK:
         return code
-    model_parts(ControlArrays(records, models, transition, xi), sample)
-    surprises(settings, machine, axes, reading)
-    virtual_inputs(settings, sample, axes, reference)
     for index in range(5):
         axis = axes[index]
         before = axis.smooth_velocity if settings.observed[index] else axis.filtered_velocity
@@ -68,24 +56,6 @@ def open_sample(
         told[3, index] = axis.smooth_velocity
         told[4, index] = axis.wanted_acceleration
     return OK
-
-
-@borrowing
-def close_by_itself(
-    records: NDArray[np.void],
-    models: NDArray[np.void],
-    transition: FloatArray,
-    xi: FloatArray,
-    direct: FloatArray,
-    quadrature: FloatArray,
-) -> int:
-    """Answer the sample by the regulator's own law; what limited the currents."""
-    settings, sample, axes = records[0].settings, records[0].sample, records[0].axes
-    machine = machine_from_array(settings.machine)
-    limited_by = currents_of_w(settings, machine, sample, axes, Currents(direct, quadrature))
-    learn(settings, sample, axes)
-    advance_models(ControlArrays(records, models, transition, xi), settings, sample)
-    return limited_by
 
 
 @compiled
@@ -98,15 +68,17 @@ def close_with_input(
     direct: FloatArray,
     quadrature: FloatArray,
 ) -> int:
-    """Answer it by the inverse of the accelerations ``wanted`` (5,); what limited the currents."""
+    """Answer it by the inverse of the accelerations ``wanted`` (5,); what limited the currents.
+
+    The regulator's own answer is that to its own w, ``virtual_input`` of the sample.
+    """
     settings, sample, axes = records[0].settings, records[0].sample, records[0].axes
     machine = machine_from_array(settings.machine)
     by_itself = sample.virtual_input.copy()
     sample.virtual_input[:] = wanted
     limited_by = currents_of_w(settings, machine, sample, axes, Currents(direct, quadrature))
     sample.virtual_input[:] = by_itself
-    learn(settings, sample, axes)
-    advance_models(ControlArrays(records, models, transition, xi), settings, sample)
+    conclude(ControlArrays(records, models, transition, xi))
     sample.virtual_input[:] = wanted
     return limited_by
 
@@ -148,8 +120,7 @@ def close_with_currents(
     sample.excess[:] = 0.0
     if keep_within_voltage(settings, machine, sample, axes, direct, quadrature):
         limited_by |= CURRENT
-    learn(settings, sample, axes)
-    advance_models(ControlArrays(records, models, transition, xi), settings, sample)
+    conclude(ControlArrays(records, models, transition, xi))
     sample.virtual_input[:] = sample.realised
     return limited_by
 
@@ -162,8 +133,6 @@ def warm_up(arrays: ControlArrays, gives_currents: bool) -> None:
     copies = ControlArrays(*(array.copy() for array in arrays))
     zero, currents = np.zeros(5), np.zeros((2, 4))
     open_sample(*copies, np.zeros(4), 0.0, 0.0, zero, zero, zero, np.empty((TOLD, 5)))
-    close_by_itself(*copies, *currents)
+    close_with_input(*copies, zero, *currents)
     if gives_currents:
         close_with_currents(*copies, *currents)
-    else:
-        close_with_input(*copies, zero, *currents)

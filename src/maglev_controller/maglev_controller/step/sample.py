@@ -109,7 +109,7 @@ def _follow_jump(
 
 
 @borrowing
-def model_parts(control: ControlArrays, sample: Record) -> None:
+def _model_parts(control: ControlArrays, sample: Record) -> None:
     """What the internal models of all axes add to w: κ ξ."""
     for index in range(5):
         part = 0.0
@@ -208,10 +208,11 @@ def _lost(settings: Record, sample: Record, index: int) -> float:
 
 
 @borrowing
-def advance_models(control: ControlArrays, settings: Record, sample: Record) -> None:
+def _advance_models(control: ControlArrays) -> None:
     """ξ⁺ = Φ_d ξ + N_d e + E_d (what was realised less what was wanted), (14), (17)."""
     models, transition, xi = control.models, control.transition, control.xi
-    axes = control.records[0].axes
+    settings, axes = control.records[0].settings, control.records[0].axes
+    sample = control.records[0].sample
     states = xi.shape[1]
     for index in range(5):
         if settings.controlled[index] == 0.0:
@@ -230,7 +231,7 @@ def advance_models(control: ControlArrays, settings: Record, sample: Record) -> 
 
 
 @borrowing
-def measure(
+def _measure(
     settings: Record, machine: Machine, sample: Record, reading: Reading, reference: Reference
 ) -> int:
     """The outputs of a reading, and whether they and the reference can be used: a code."""
@@ -244,7 +245,7 @@ def measure(
 
 
 @borrowing
-def virtual_inputs(settings: Record, sample: Record, axes: Record, reference: Reference) -> None:
+def _virtual_inputs(settings: Record, sample: Record, axes: Record, reference: Reference) -> None:
     """w of all axes; internal models and what surprises the observers are known."""
     for index in range(5):
         sample.position[index] = sample.output[index]
@@ -275,12 +276,28 @@ def currents_of_w(
 
 
 @borrowing
-def learn(settings: Record, sample: Record, axes: Record) -> None:
-    """Take what is realised at the sample into observers and friction."""
+def decide(control: ControlArrays, machine: Machine, reading: Reading, reference: Reference) -> int:
+    """w of all axes for a reading and a reference. A fault code, or 0."""
+    settings, sample = control.records[0].settings, control.records[0].sample
+    axes = control.records[0].axes
+    code = _measure(settings, machine, sample, reading, reference)
+    if code == OK:
+        _model_parts(control, sample)
+        surprises(settings, machine, axes, reading)
+        _virtual_inputs(settings, sample, axes, reference)
+    return code
+
+
+@borrowing
+def conclude(control: ControlArrays) -> None:
+    """Take what is realised at the sample into observers, friction and internal models."""
+    settings, sample = control.records[0].settings, control.records[0].sample
+    axes = control.records[0].axes
     for index in range(5):
         if settings.observed[index]:
             predict(settings, axes[index], sample.realised[index])
         learn_friction(settings, axes[index], index, sample.realised[index])
+    _advance_models(control)
 
 
 @borrowing
@@ -291,18 +308,14 @@ def control_step(
     records = control.records[0]
     settings, sample, axes = records.settings, records.sample, records.axes
     machine = machine_from_array(settings.machine)
-    code = measure(settings, machine, sample, reading, reference)
+    code = decide(control, machine, reading, reference)
     if code != OK:
         for motor in range(4):
             currents.direct[motor] = 0.0
             currents.quadrature[motor] = 0.0
         return code
-    model_parts(control, sample)
-    surprises(settings, machine, axes, reading)
-    virtual_inputs(settings, sample, axes, reference)
     limited_by = currents_of_w(settings, machine, sample, axes, currents)
-    learn(settings, sample, axes)
-    advance_models(control, settings, sample)
+    conclude(control)
     return limited_by
 
 
