@@ -58,7 +58,7 @@ def open_sample(
     return OK
 
 
-@compiled
+@borrowing
 def close_with_input(
     records: NDArray[np.void],
     models: NDArray[np.void],
@@ -74,12 +74,16 @@ def close_with_input(
     """
     settings, sample, axes = records[0].settings, records[0].sample, records[0].axes
     machine = machine_from_array(settings.machine)
-    by_itself = sample.virtual_input.copy()
-    sample.virtual_input[:] = wanted
+    w = sample.virtual_input
+    by_itself = (w[0], w[1], w[2], w[3], w[4])
+    for index in range(5):
+        w[index] = wanted[index]
     limited_by = currents_of_w(settings, machine, sample, axes, Currents(direct, quadrature))
-    sample.virtual_input[:] = by_itself
+    for index in range(5):
+        w[index] = by_itself[index]
     conclude(ControlArrays(records, models, transition, xi))
-    sample.virtual_input[:] = wanted
+    for index in range(5):
+        w[index] = wanted[index]
     return limited_by
 
 
