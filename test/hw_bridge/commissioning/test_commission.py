@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import _thread
+import ctypes
 import json
 import signal
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import SimpleNamespace
@@ -47,7 +49,9 @@ def exchanged(values: Sequence[int], one: int, two: int) -> list[int]:
 
 
 def commission(
-    claimed: dict[str, object], asked: Callable[[EmulatedBoards, str], None] | None = None
+    claimed: dict[str, object],
+    asked: Callable[[EmulatedBoards, str], None] | None = None,
+    signals: Sequence[int] = (),
 ) -> tuple[list[str], EmulatedBoards]:
     """Commission a machine that is wired as by default, with what the parameters claim.
 
@@ -65,7 +69,13 @@ def commission(
 
     operator = EmulatedPerson(boards, go_on)
     steps = Commissioning(
-        parameters, driver, peak=PEAK, operator=operator, tell=told.append, priority=40
+        parameters,
+        driver,
+        peak=PEAK,
+        operator=operator,
+        tell=told.append,
+        priority=40,
+        signals=signals,
     )
     try:
         steps.run()
@@ -154,6 +164,36 @@ def test_a_signal_ends_it_where_current_flows(number: signal.Signals, step: str)
     with _ended_by_signals(), pytest.raises(KeyboardInterrupt):
         commission({}, asked)
     assert told[-1].startswith(step)
+
+
+def test_a_signal_whose_exception_is_lost_ends_it_at_the_next_step(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    told: list[str] = []
+    lost: list[object] = []
+    monkeypatch.setattr(sys, 'unraisablehook', lost.append)
+
+    @ctypes.CFUNCTYPE(None)
+    def called_from_c() -> None:
+        _thread.interrupt_main(signal.SIGTERM)
+        for _ in range(2):  # a handler runs at the latest where Python goes back
+            pass
+
+    def asked(boards: EmulatedBoards, question: str) -> None:
+        told.append(question)
+        tick = boards.tick
+
+        def signalled() -> None:
+            tick()
+            if question.startswith('motor 1') and not lost:
+                called_from_c()
+
+        boards.tick = signalled  # type: ignore[method-assign]
+
+    with _ended_by_signals() as signals, pytest.raises(KeyboardInterrupt):
+        commission({}, asked, signals)
+    assert lost
+    assert told[-1].startswith('motor 1')
 
 
 FAULT = Fault('board', 'a cable was loose', 'see to it', True)

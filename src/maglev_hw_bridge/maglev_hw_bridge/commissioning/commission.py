@@ -66,13 +66,16 @@ class Commissioning:
         operator: Operator,
         tell: Callable[[str], None] = print,
         priority: int = 0,
+        signals: Sequence[int] = (),
     ) -> None:
-        """``peak``: largest current of a phase alone [A]; ``priority`` in the air, real-time."""
+        """``peak``: largest current of a phase alone [A]; ``priority`` in the air, real-time.
+
+        ``signals`` that came end it before it goes on, where the exception of one was lost.
+        """
         self._parameters, self._driver = parameters, driver
         self._peak, self._operator, self._tell = peak, operator, tell
-        self._ask = operator.go_on
         self._memory = Memory(parameters)
-        self._priority = priority
+        self._priority, self._signals = priority, signals
         self._realtime = parameters.driver != 'emulated'
         self._encoders = Encoders(parameters)
         self._counts = np.zeros(6, dtype=np.int32)
@@ -107,6 +110,15 @@ class Commissioning:
                 with contextlib.suppress(StageError):  # what is kept then is worse
                     self._keep(active=False)
 
+    def _ask(self, step: str) -> None:
+        self._heed_signals()
+        self._operator.go_on(step)
+
+    def _heed_signals(self) -> None:
+        """C code that calls Python, as Numba's while it loads, swallows what a signal raises."""
+        if self._signals:
+            raise KeyboardInterrupt
+
     def _recall(self) -> None:
         """What came before: a fault is for the operator to look into now."""
         load, fault = self._memory.recall()
@@ -138,6 +150,7 @@ class Commissioning:
     def _current(self) -> Iterator[None]:
         """In here it may flow."""
         self._let_cool()
+        self._heed_signals()
         try:
             yield
         finally:
@@ -279,15 +292,20 @@ def _operator(driver: Driver, yes: bool) -> Operator:
 
 
 @contextlib.contextmanager
-def _ended_by_signals() -> Iterator[None]:
-    """What may end or stop it does so in order, as SIGINT does: none leaves current."""
+def _ended_by_signals() -> Iterator[Sequence[int]]:
+    """What may end or stop it does so in order, as SIGINT does: none leaves current.
 
-    def end(_number: int, _frame: object) -> None:
+    Those that came are noted here.
+    """
+    caught: list[int] = []
+
+    def end(number: int, _frame: object) -> None:
+        caught.append(number)
         raise KeyboardInterrupt
 
     before = {number: signal.signal(number, end) for number in ENDING}
     try:
-        yield
+        yield caught
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
@@ -340,7 +358,7 @@ def _commission(options: argparse.Namespace, said: list[str]) -> int:
         parameters = _load(options.params)
         driver = make_driver(parameters, realtime=parameters.driver != 'emulated')
         operator = _operator(driver, options.yes)
-        with _ended_by_signals():
+        with _ended_by_signals() as signals:
             Commissioning(
                 parameters,
                 driver,
@@ -348,6 +366,7 @@ def _commission(options: argparse.Namespace, said: list[str]) -> int:
                 operator=operator,
                 tell=tell,
                 priority=parameters.realtime_priority,
+                signals=signals,
             ).run()
     except WrongError as error:
         said.append(f'wrong: {error}')
