@@ -22,7 +22,7 @@ from maglev_reference.parameters import ReferenceParameters
 from maglev_study.arguments import a_table
 from maglev_study.closed_loop import LawFault
 from maglev_study.flight import FlightRecord, fly
-from maglev_study.robustness.workers import results
+from maglev_study.workers import results
 
 NODES = {
     'plant': PlantParameters,

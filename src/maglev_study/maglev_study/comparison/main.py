@@ -9,7 +9,6 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
@@ -19,12 +18,12 @@ from maglev_model.parameters import replace
 from maglev_model.programs.arguments import positive
 from maglev_model.programs.command import leave_with
 from maglev_model.programs.progress import Progress, add_output_options
-from maglev_study.closed_loop import warm_up
 from maglev_study.command import DONE, INTERRUPTED, command, writable
 from maglev_study.comparison.contestants import Contestant, find_contestants
 from maglev_study.comparison.experiments import Row, loops, steps, tracking
 from maglev_study.comparison.region import Region, region
 from maglev_study.comparison.table import table, to_json
+from maglev_study.workers import MOST_JOBS, results
 
 
 class Part(NamedTuple):
@@ -51,7 +50,6 @@ def _compared(options: argparse.Namespace) -> tuple[int, dict[str, Any]]:
     out = writable(options.out)
     print('the closed loop as a library, without ROS: the graph would take hours', flush=True)
     started = time.monotonic()
-    warm_up()
     try:
         rows, regions = _compare(contestants, options.quick)
     except KeyboardInterrupt:
@@ -130,9 +128,7 @@ def _parts(contestants: Sequence[Contestant], quick: bool) -> Iterator[Part]:
 def _compare(
     contestants: Sequence[Contestant], quick: bool
 ) -> tuple[dict[str, list[Row]], dict[str, list[Region]]]:
-    parts = list(_parts(contestants, quick))
-    with ProcessPoolExecutor(max_workers=max(1, len(os.sched_getaffinity(0)))) as pool:
-        found = _run(pool, parts)
+    found = _run(list(_parts(contestants, quick)))
     names = [one.name for one in contestants]
     rows = {
         name: found[name, 'loops'] + found[name, 'steps'] + found[name, 'tracking']
@@ -142,21 +138,23 @@ def _compare(
     return rows, regions
 
 
-def _run(pool: Executor, parts: Sequence[Part]) -> dict[tuple[str, str], Any]:
+def _run(parts: Sequence[Part]) -> dict[tuple[str, str], Any]:
     """The results by law and part; the work that is left is dropped when one fails."""
     progress = Progress('compare', 'parts')
-    futures = {pool.submit(part.work, *part.arguments): part for part in parts}
     found: dict[tuple[str, str], Any] = {}
+    tasks = [(part,) for part in parts]
+    jobs = min(len(os.sched_getaffinity(0)), MOST_JOBS)
     try:
-        for future in as_completed(futures):
-            part = futures[future]
-            found[part.law, part.name] = future.result()
-            progress.tell(len(found), len(parts), f', {part.law}: {part.name}')
-    except BaseException:
+        for law, name, result in results(_done, tasks, jobs=jobs):
+            found[law, name] = result
+            progress.tell(len(found), len(parts), f', {law}: {name}')
+    finally:
         progress.end()
-        pool.shutdown(wait=False, cancel_futures=True)
-        raise
     return found
+
+
+def _done(part: Part) -> tuple[str, str, Any]:
+    return part.law, part.name, part.work(*part.arguments)
 
 
 if __name__ == '__main__':

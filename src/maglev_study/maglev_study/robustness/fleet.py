@@ -18,7 +18,7 @@ from maglev_study.robustness.draw import NOMINAL, Draw, Machine, check_draws, ma
 from maglev_study.robustness.experiments import Experiment, chosen, experiments
 from maglev_study.robustness.fly import Flown, fly
 from maglev_study.robustness.journal import Journal
-from maglev_study.robustness.workers import results
+from maglev_study.workers import results
 
 JOURNAL = 'flown.jsonl'
 """The file in a campaign's folder that its results are appended to."""

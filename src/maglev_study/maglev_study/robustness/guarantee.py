@@ -18,7 +18,7 @@ from maglev_study.multiloop import Guarantee, MultiLoop, multiloop
 from maglev_study.references import HOVER
 from maglev_study.robustness.draw import NOMINAL
 from maglev_study.robustness.fleet import Plan
-from maglev_study.robustness.workers import results
+from maglev_study.workers import results
 
 GAPS = (0.020, 0.0225, 0.025, 0.0275, 0.030)
 """Air gaps looked at [m], those within the machine's stops."""
@@ -111,7 +111,7 @@ def guarantees(
 
     ``heard`` is told how many loops of how many are looked at. Raises ParameterError where a
     machine has no such loop, as one that cannot hover at :data:`HOVERING`, and what
-    :func:`~maglev_study.robustness.workers.results` raises.
+    :func:`~maglev_study.workers.results` raises.
     """
     laws = [one for one in plan.contestants if control_law(one.controller).make is None]
     tasks = [task for one in laws for task in _tasks(plan.part(one))]

@@ -22,7 +22,7 @@ from maglev_study.robustness.fly import LOST as LOST_FLIGHT
 from maglev_study.robustness.fly import Flown
 from maglev_study.robustness.guarantee import HOVERING
 from maglev_study.robustness.outcome import FLOOR
-from maglev_study.robustness.workers import results
+from maglev_study.workers import results
 
 RANGES: Mapping[str, tuple[float, float]] = {
     'bandwidth': (60.0, 400.0),

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import signal
-import threading
 from collections.abc import Callable, Iterator, Sequence
+from multiprocessing import resource_tracker
 from numbers import Integral
 from typing import Any, TypeVar
 
@@ -50,14 +49,15 @@ def results(
     warm_up()  # compiled once, before there are processes
     with joblib.parallel_config('loky', n_jobs=jobs, inner_max_num_threads=1):
         parallel = joblib.Parallel(return_as='generator_unordered', batch_size=1)
-        yield from parallel(joblib.delayed(_undisturbed)(function, task) for task in tasks)
-
-
-def _undisturbed(function: Callable[..., T], task: tuple[Any, ...]) -> T:
-    """Leave Ctrl-C to whoever started this process."""
-    if threading.current_thread() is threading.main_thread() and multiprocessing.parent_process():
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-    return function(*task)
+        # What starts with Ctrl-C held back leaves it to whoever started it, from its first line;
+        # Python's tracker, started meanwhile, would let it through.
+        resource_tracker.ensure_running()
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            found = parallel(joblib.delayed(function)(*task) for task in tasks)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        yield from found
 
 
 def _on_cluster(
