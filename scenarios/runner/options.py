@@ -7,6 +7,9 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
+DURATION = (0.01, 36000.0)
+"""From and to, as the parameter of the reference [s]."""
+
 Check = Callable[[str, str], str]
 """Makes of an option's name and value the value that is used; raises :class:`WrongUseError`."""
 
@@ -88,9 +91,12 @@ def one_of(*choices: str) -> Check:
 
 
 def seconds(name: str, value: str) -> str:
-    """A duration above 0 [s], as ROS reads a double: with a point."""
-    if not re.fullmatch(r'[0-9]+\.?[0-9]*', value) or not re.search('[1-9]', value):
-        raise WrongUseError(f"{name} is '{value}', it must be seconds above 0, as 2.5")
+    """A duration that the reference takes [s], as ROS reads a double: with a point."""
+    low, high = DURATION
+    if not re.fullmatch(r'[0-9]+\.?[0-9]*', value) or not low <= float(value) <= high:
+        raise WrongUseError(
+            f"{name} is '{value}', it must be seconds from {low:g} to {high:g}, as 2.5"
+        )
     return f'{value}0' if '.' in value else f'{value}.0'
 
 

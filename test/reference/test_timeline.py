@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import maglev_reference
+import maglev_reference.timeline
 from maglev_model.contract.phases import Phase
 from maglev_model.geometry import motor_gaps
 from maglev_model.parameters import SHARED_GROUPS, build, from_yaml, read_yaml, specs, to_yaml
@@ -334,3 +335,17 @@ def test_axis_names_are_quoted_because_ros_takes_a_bare_y_for_true():
     for text in [*texts, effective]:
         assert not bare_y.search(re.sub('#.*', '', text))
     assert yaml.safe_load(effective)['reference']['ros__parameters']['steps']['axis'][0] == 'y'
+
+
+def test_hours_of_standing_still_are_checked_at_once(monkeypatch):
+    checked = []
+    monkeypatch.setattr(
+        maglev_reference.timeline, 'check_samples', lambda samples, *_: checked.append(samples)
+    )
+    hours = Timeline(scenario('hold', duration=36000.0))
+    assert hours.end > 36_000_000
+    assert sum(len(samples.position) for samples in checked) < 20_000
+    away = {'home': [0.040, 0.0, 0.0, 0.0, 0.0], 'duration': 36000.0}
+    monkeypatch.undo()
+    with pytest.raises(UnreachableError, match=r'y is 0\.04 m'):
+        Timeline(scenario('hold', **away))

@@ -6,7 +6,8 @@ import pytest
 import yaml
 from stand_ins import NODES, ROOT, Tree
 
-from maglev_model.parameters import read_argument
+from maglev_model.parameters import read_argument, specs
+from maglev_reference.parameters import ReferenceParameters
 from runner import options, overlays
 from runner.graph import text_value
 
@@ -59,6 +60,11 @@ def test_without_a_machine_file_each_node_starts_with_its_own(tree: Tree) -> Non
     assert not [word for word in tree.arguments('reference') if 'duration' in word]
 
 
+def test_a_duration_is_what_the_reference_takes() -> None:
+    spec = specs(ReferenceParameters)['duration']
+    assert (spec.lower, spec.upper) == options.DURATION
+
+
 @pytest.mark.parametrize(
     ('options', 'words'),
     [
@@ -66,8 +72,10 @@ def test_without_a_machine_file_each_node_starts_with_its_own(tree: Tree) -> Non
         (['ellipse'], "unknown option 'ellipse'"),
         (['--mode', 'fast'], "--mode is 'fast', it must be one of: lockstep realtime"),
         (['--stage=model'], "--stage is 'model', it must be one of: plant hw_bridge"),
-        (['--duration', 'long'], "--duration is 'long', it must be seconds above 0, as 2.5"),
-        (['--duration', '1e3'], "--duration is '1e3', it must be seconds above 0, as 2.5"),
+        (['--duration', 'long'], "--duration is 'long', it must be seconds from 0.01 to"),
+        (['--duration', '1e3'], "--duration is '1e3', it must be seconds from 0.01 to 36000, as"),
+        (['--duration', '9' * 26], 'it must be seconds from 0.01 to 36000, as 2.5'),
+        (['--duration', '36000.1'], "--duration is '36000.1'"),
         (['--duration', '-1'], "--duration is '-1'"),
         (['--duration', '0'], "--duration is '0'"),
         (['--duration'], '--duration needs a value'),

@@ -18,7 +18,7 @@ from maglev_model.axes import FloatArray, Y
 from maglev_model.contract.phases import Phase
 from maglev_reference.check import UnreachableError, check_locked, check_rest, check_samples
 from maglev_reference.currents import check_currents
-from maglev_reference.motion import Kinematics, Motion, State, state_at
+from maglev_reference.motion import Kinematics, Motion, Stand, State, state_at
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.segments import Planner, Segment
 from maglev_reference.trajectories import course, steps
@@ -242,7 +242,10 @@ class Timeline:
         """What is measured first, so that it and not the way to it is found at fault."""
         end = self._segments[-1].first
         for segment in sorted(self._segments, key=lambda segment: segment.phase not in _MEASURED):
-            self._check_range(max(segment.first - 1, 0), min(segment.last, end) + 1)
+            last = min(segment.last, end)
+            if isinstance(segment.motion, Stand):  # a sample is as the one before
+                last = min(last, segment.first + 1)
+            self._check_range(max(segment.first - 1, 0), last + 1)
 
     def _check_way_up(self, first: int) -> None:
         """From sample ``first`` to what is measured; that has been checked, and what follows."""
