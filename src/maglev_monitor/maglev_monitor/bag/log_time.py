@@ -62,6 +62,6 @@ class LogTimes:
 
 
 def _stamp(data: bytes) -> int:
-    """The header's stamp [ns], 0 where there is none."""
+    """The header's stamp [ns], 0 where there is none or it lies before all that a bag can tell."""
     seconds, nanoseconds = _STAMP.unpack_from(data, _HEADER)
-    return int(seconds * 1_000_000_000 + nanoseconds)
+    return max(int(seconds * 1_000_000_000 + nanoseconds), 0)
