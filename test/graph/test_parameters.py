@@ -27,7 +27,7 @@ REFUSED = (
     (of('answer_timeout', string_value='soon'), "'answer_timeout' is 'soon' (str), its type is"),
     (of('answer_timeout', double_value=math.nan), "'answer_timeout' is nan, it must be finite"),
     (of('answer_timeout', double_value=0.0), "'answer_timeout' is 0, it must lie in [0.1, 600] s"),
-    (of('answer_timout', double_value=1.0), "did you mean 'answer_timeout'?"),
+    (of('answer_timout', double_value=1.0), "there is no parameter 'answer_timout'"),
     (of('machine.mass_y', double_value=7.0), "'machine.mass_y' is read-only"),
     (of('mode', string_value='realtime'), "'mode' is read-only"),
     (
@@ -82,3 +82,9 @@ def test_read_only_is_what_cannot_change(plant: Any) -> None:
     names = ['answer_timeout', 'watchdog', 'machine.mass_y', 'mode']
     told = plant(DescribeParameters, 'describe_parameters', names=names).descriptors
     assert [each.read_only for each in told] == [False, False, True, True]
+
+
+def test_no_time_of_the_loop_goes_into_a_hint_at_the_right_name(plant: Any) -> None:
+    unknown = [of('answer_timout', double_value=1.0)]
+    (result,) = plant(SetParameters, 'set_parameters', parameters=unknown).results
+    assert result.reason == "there is no parameter 'answer_timout'"

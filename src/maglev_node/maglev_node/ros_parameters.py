@@ -62,7 +62,8 @@ class ParameterService(parameter_service.ParameterService):
         """What is given, as the node holds it. Raises ParameterError."""
         name, spec = given.name, self._specs.get(given.name)
         if spec is None and not node.has_parameter(name):
-            raise unknown_parameter(name, self._specs)
+            # No look for the nearest name, which takes 2 to 13 ms, as many samples.
+            raise ParameterError(f"there is no parameter '{name}'")
         if node.describe_parameter(name).read_only:
             raise ParameterError(f"parameter '{name}' is read-only: it is given at the start")
         try:
