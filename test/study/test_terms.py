@@ -131,12 +131,6 @@ def test_the_matrix_is_the_linear_part_and_well_conditioned() -> None:
     assert condition_range(M, 0.025, level, at_motors=True)[1] == pytest.approx(expected_ratio)
 
 
-@pytest.mark.parametrize('wrong', [{'phi': -0.1}, {'theta': -0.1}, {'steps': 0}])
-def test_a_range_that_is_none_is_refused(wrong: dict[str, float]) -> None:
-    with pytest.raises(ValueError, match='no range of tilts'):
-        TiltRange(**wrong)  # type: ignore[arg-type]
-
-
 @pytest.fixture
 def few_tilts(monkeypatch: pytest.MonkeyPatch) -> None:
     """Corners and centre of the range only: the grid's density is tested above."""

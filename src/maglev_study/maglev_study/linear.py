@@ -191,14 +191,14 @@ def linearise(
     stage = StageAt(given, at)
     if axis is not None:
         table = a_table(ControllerParameters, controller, 'controller')
-        loop = _axis_loop(stage, given, table, axis)
+        matrices, names = _axis_loop(stage, given, table, axis)
         inputs, outputs = ['reference', 'disturbance', 'noise'], [axis, 'error', 'w']
         return control.ss(
-            *loop.matrices,
+            *matrices,
             table.sample_time,
             inputs=inputs,
             outputs=outputs,
-            states=loop.names,
+            states=names,
             name=f'loop of {axis}',
         )
     by_state, by_current = stage.lagging_slopes()
@@ -214,11 +214,8 @@ def linearise(
     )
 
 
-class _Loop(NamedTuple):
-    """A, B, C, D of a closed loop and the names of its states."""
-
-    matrices: tuple[FloatArray, FloatArray, FloatArray, FloatArray]
-    names: list[str]
+_Loop = tuple[tuple[FloatArray, FloatArray, FloatArray, FloatArray], list[str]]
+"""A, B, C, D of a closed loop and the names of its states."""
 
 
 def _axis_loop(
@@ -337,4 +334,4 @@ def _closed(
     read = np.vstack((body[0], body[0] - reference, filtered))
     names = [axis, f'{axis}_rate', f'{axis}_acceleration'][: len(sampled)] + ['waiting'] * delay
     names += [f'feedback_{k}' for k in range(sizes[2])] + [f'notch_{k}' for k in range(sizes[3])]
-    return _Loop((after[:, :size], after[:, size:], read[:, :size], read[:, size:]), names)
+    return (after[:, :size], after[:, size:], read[:, :size], read[:, size:]), names

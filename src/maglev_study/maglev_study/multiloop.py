@@ -83,7 +83,8 @@ class MultiLoop(NamedTuple):
         """At the currents, and at the readings, the least over all frequencies."""
         if not self.stable():
             return NOTHING, NOTHING
-        return self._guarantee(_at_the_currents), self._guarantee(_at_the_readings)
+        at_the_currents = self._guarantee(lambda plant, controller: -controller @ plant)
+        return at_the_currents, self._guarantee(lambda plant, controller: -plant @ controller)
 
     def _guarantee(self, broken: Broken) -> Guarantee:
         """Of the loop broken there, for negative feedback: looked for finer about the worst."""
@@ -98,14 +99,6 @@ class MultiLoop(NamedTuple):
         half = min(0.5 / most, 1.0)
         gain = 20.0 * math.log10((1.0 + half) / (1.0 - half)) if half < 1.0 else math.inf
         return Guarantee(1.0 / most, gain, 2.0 * math.degrees(math.atan(half)))
-
-
-def _at_the_currents(plant: ComplexArray, controller: ComplexArray) -> ComplexArray:
-    return -controller @ plant
-
-
-def _at_the_readings(plant: ComplexArray, controller: ComplexArray) -> ComplexArray:
-    return -plant @ controller
 
 
 def _response(part: Part, z: ComplexArray) -> ComplexArray:

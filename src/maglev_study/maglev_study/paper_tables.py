@@ -18,7 +18,7 @@ from maglev_model.axes import AXES
 from maglev_model.paper import SCENARIOS, STEPS, TRACKING, WINDOW, PublishedStep
 from maglev_model.programs.command import leave_with
 from maglev_monitor.bag.analysis import Analysis, analyse
-from maglev_monitor.bag.errors import BagError
+from maglev_monitor.bag.errors import BagError, refuse
 from maglev_monitor.metrics.readable import angle_or_length, micro, seconds
 from maglev_monitor.metrics.result_file import write_whole
 
@@ -166,14 +166,15 @@ def paper_tables(arguments: Sequence[str] | None = None) -> int:
     ]
     if all(run.result is None for run in runs):
         example = options.folder / next(iter(CASES)) / SCENARIOS[0]
-        return _error(f"there is no finished run in '{options.folder}', such as '{example}'")
+        reason = f"there is no finished run in '{options.folder}', such as '{example}'"
+        return refuse('paper_tables', reason, NOTHING)
     out = options.out or options.folder
     text = markdown(runs)
     try:
         write_whole(out / 'paper_tables.md', text)
         write_whole(out / 'paper_tables.html', render(runs))
     except OSError as error:
-        return _error(f"cannot write to '{out}': {error.strerror}")
+        return refuse('paper_tables', f"cannot write to '{out}': {error.strerror}", NOTHING)
     print(text)
     for run in runs:
         if run.problem:
@@ -203,11 +204,6 @@ def _parser() -> argparse.ArgumentParser:
         '--out', type=Path, metavar='DIR', help='where the page goes (default: the folder)'
     )
     return parser
-
-
-def _error(message: str) -> int:
-    print(f'paper_tables: error: {message}', file=sys.stderr)
-    return NOTHING
 
 
 def _failure(result: Mapping[str, Any]) -> str:

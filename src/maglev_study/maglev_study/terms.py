@@ -50,11 +50,6 @@ class TiltRange:
     theta: float = 0.014
     steps: int = 12
 
-    def __post_init__(self) -> None:
-        """Raise ValueError for tilts below zero, or no steps to reach them."""
-        if self.phi < 0.0 or self.theta < 0.0 or self.steps < 1:
-            raise ValueError(f'no range of tilts: {self}')
-
     def __iter__(self) -> Iterator[tuple[float, float]]:
         """All pairs phi, theta of the grid [rad]; zero is one of them when ``steps`` is even."""
         for phi in np.linspace(-self.phi, self.phi, self.steps + 1):

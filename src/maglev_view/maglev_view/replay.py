@@ -20,7 +20,7 @@ from maglev_model.axes import FloatArray
 from maglev_model.programs.command import leave_with
 from maglev_model.programs.progress import Progress
 from maglev_monitor.bag.analysis import Analysis, analyse
-from maglev_monitor.bag.errors import BagError
+from maglev_monitor.bag.errors import BagError, refuse
 from maglev_monitor.bag.reader import run_folder
 from maglev_monitor.metrics.curves import COLUMNS
 from maglev_monitor.metrics.result_file import write_whole
@@ -80,24 +80,19 @@ def run(arguments: Sequence[str] | None = None) -> int:
     )
     given = parser.parse_args(arguments)
     if find_spec('viser') is None:
-        return _refuse(_MISSING, NO_VISER)
+        return refuse('replay', _MISSING, NO_VISER)
     page = (given.out or run_folder(given.bag)) / REPLAY
     try:
         analysis = analyse(given.bag, Progress('replay', '%', lines=False))
         write_whole(page, replay(analysis))
     except BagError as error:
-        return _refuse(str(error))
+        return refuse('replay', error, WRONG)
     except OSError as error:
-        return _refuse(f"cannot write to '{page.parent}': {error.strerror}")
+        return refuse('replay', f"cannot write to '{page.parent}': {error.strerror}", WRONG)
     for note in analysis.notes:
         print(f'replay: {note}', file=sys.stderr)
     print(f'replay: {page}')
     return 0
-
-
-def _refuse(words: str, code: int = WRONG) -> int:
-    print(f'replay: error: {words}', file=sys.stderr)
-    return code
 
 
 def main() -> NoReturn:

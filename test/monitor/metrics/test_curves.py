@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -52,12 +51,6 @@ def test_first_values_are_the_first_ones() -> None:
     series.add(np.arange(8), np.arange(8.0)[:, None])
     np.testing.assert_array_equal(series.first[:, 0], [0.0, 2.0, 4.0, 6.0])
     np.testing.assert_array_equal(series.sequence, [0, 2, 4, 6])
-
-
-@pytest.mark.parametrize('bins', [0, 3, -2])
-def test_bins_must_be_even(bins: int) -> None:
-    with pytest.raises(ValueError, match='even'):
-        Envelope(1, bins)
 
 
 def test_run_curves(run: Any, messages: dict[str, list[bytes]]) -> None:

@@ -13,7 +13,7 @@ from maglev_model.programs.arguments import not_negative
 from maglev_model.programs.command import leave_with
 from maglev_model.programs.progress import Progress
 from maglev_monitor.bag.compare import TopicComparison, compare
-from maglev_monitor.bag.errors import BagError
+from maglev_monitor.bag.errors import BagError, refuse
 from maglev_monitor.bag.reader import Bag
 
 EQUAL, DIFFERENT, UNREADABLE = 0, 1, 2
@@ -36,8 +36,7 @@ def compare_bags(arguments: Sequence[str] | None = None) -> int:
         if not comparisons or (lost and options.topics is not _ALL):
             raise BagError(f"neither bag holds '{', '.join(lost)}'")
     except BagError as error:
-        print(f'compare_bags: error: {error}', file=sys.stderr)
-        return UNREADABLE
+        return refuse('compare_bags', error, UNREADABLE)
     for bag in bags:
         for note in bag.notes:
             print(f'compare_bags: {bag.path}: {note}', file=sys.stderr)

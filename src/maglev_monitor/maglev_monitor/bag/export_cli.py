@@ -12,7 +12,7 @@ from maglev_model.programs.command import leave_with
 from maglev_model.programs.optional import MissingLibraryError
 from maglev_model.programs.progress import Progress
 from maglev_monitor.bag.columns import table
-from maglev_monitor.bag.errors import BagError
+from maglev_monitor.bag.errors import BagError, refuse
 from maglev_monitor.bag.export import FORMATS, write
 from maglev_monitor.bag.reader import run_folder
 
@@ -34,9 +34,9 @@ def export(arguments: Sequence[str] | None = None) -> int:
         written = Progress('export: written', '%', lines=False)
         files = write(found, out, form, written)
     except (BagError, MissingLibraryError) as error:
-        return _failed(str(error))
+        return refuse('export', error, FAILED)
     except OSError as error:
-        return _failed(f"cannot write '{out}': {error.strerror}")
+        return refuse('export', f"cannot write '{out}': {error.strerror}", FAILED)
     for note in found.notes:
         print(f'export: {note}', file=sys.stderr)
     print(f'{len(found.columns["sample"])} samples, {len(found.columns)} columns')
@@ -48,11 +48,6 @@ def export(arguments: Sequence[str] | None = None) -> int:
 def main() -> NoReturn:
     """Entry point of the executable."""
     leave_with(export)
-
-
-def _failed(reason: str) -> int:
-    print(f'export: error: {reason}', file=sys.stderr)
-    return FAILED
 
 
 def _parser() -> argparse.ArgumentParser:

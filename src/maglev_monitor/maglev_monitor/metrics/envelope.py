@@ -17,8 +17,6 @@ class Envelope:
     """
 
     def __init__(self, columns: int, bins: int = 3000) -> None:
-        if bins < 2 or bins % 2:
-            raise ValueError(f'bins is {bins}: need an even number')
         self._low = np.full((bins, columns), np.nan)
         self._high = np.full((bins, columns), np.nan)
         self._first = np.full((bins, columns), np.nan)

@@ -323,40 +323,41 @@ class _Timing:
         self.histogram = np.zeros(_TICK_BINS, np.int64)
         self._longest = 0
         self._periods: set[int] = set()  # the least and the greatest of stage time [ns]
-        self._first: tuple[int, int, int] | None = None  # sequence, stamp, late samples
-        self._last: tuple[int, int, int] | None = None
-        self.latest: Instant | None = None
+        self._first: Records | None = None  # measured sample, (1,)
+        self._last: Records | None = None
+
+    @property
+    def latest(self) -> Instant | None:
         """When the last sample was measured."""
+        return None if self._last is None else _instant(self._last[0])
 
     def add(self, rows: Records) -> None:
         """Take measured samples, at least one."""
-        sequence, stamp, stage = rows['sequence'], rows['stamp'], rows['stage_time']
-        if self._last is not None and self.latest is not None:
-            sequence = np.concatenate([[self._last[0]], sequence])
-            stamp = np.concatenate([[self._last[1]], stamp])
-            stage = np.concatenate([[self.latest.stage], stage])
-        follows = np.diff(sequence) == 1
-        ticks, periods = np.diff(stamp)[follows], np.diff(stage)[follows]
+        if self._first is None:
+            self._first = rows[:1].copy()
+        before = rows[:0] if self._last is None else self._last
+        steps, walls, stages = (
+            np.diff(np.concatenate([before[name], rows[name]]))
+            for name in ('sequence', 'stamp', 'stage_time')
+        )
+        ticks, periods = walls[steps == 1], stages[steps == 1]
         if len(ticks):
             known = {*self._periods, int(periods.min()), int(periods.max())}
             self._periods = {min(known), max(known)}
             self._longest = max(self._longest, int(ticks.max()))
             bins = np.clip(ticks // round(_TICK_RESOLUTION * 1e9), 0, _TICK_BINS - 1)
             self.histogram += np.bincount(bins, minlength=_TICK_BINS)
-        ends = [
-            (int(row['sequence']), int(row['stamp']), int(row['late_samples']))
-            for row in (rows[0], rows[-1])
-        ]
-        self._first = self._first or ends[0]
-        self._last = ends[1]
-        self.latest = Instant(ends[1][1], int(rows['stage_time'][-1]))
+        self._last = rows[-1:].copy()
 
     def result(self, sample_time: float) -> dict[str, Any]:
         """Its own ``sample_time`` is the stage's, None where that has no clock of its own [s]."""
-        first = self._first or (0, 0, 0)
-        last = self._last or (0, 0, 0)
-        wall_time = (last[1] - first[1]) * 1e-9
-        stage_time = (last[0] - first[0]) * sample_time
+        samples = wall = late = 0
+        if self._first is not None and self._last is not None:
+            samples, wall, late = (
+                int(self._last[name][0]) - int(self._first[name][0])
+                for name in ('sequence', 'stamp', 'late_samples')
+            )
+        wall_time, stage_time = wall * 1e-9, samples * sample_time
         return {
             'sample_time': 1e-9 * min(self._periods) if len(self._periods) == 1 else None,
             'real_time_factor': stage_time / wall_time if wall_time > 0.0 else None,
@@ -364,7 +365,7 @@ class _Timing:
             'tick_p99': self._quantile(0.99),
             'tick_max': self._longest * 1e-9,
             'wall_time': wall_time,
-            'late_samples': last[2] - first[2],
+            'late_samples': late,
         }
 
     def _quantile(self, fraction: float) -> float | None:

@@ -14,7 +14,7 @@ from typing import NoReturn
 from maglev_model.programs.command import leave_with
 from maglev_model.programs.progress import Progress
 from maglev_monitor.bag.analysis import Analysis, analyse
-from maglev_monitor.bag.errors import BagError
+from maglev_monitor.bag.errors import BagError, refuse
 from maglev_monitor.bag.reader import run_folder
 from maglev_monitor.metrics.result_file import write_metrics
 from maglev_monitor.report.terminal import as_text
@@ -33,8 +33,7 @@ def analyze(arguments: Sequence[str] | None = None) -> int:
     try:
         analyses = [analyse(bag, Progress('analyze', '%', lines=False)) for bag in bags]
     except BagError as error:
-        print(f'analyze: error: {error}', file=sys.stderr)
-        return BAD_BAG
+        return refuse('analyze', error, BAD_BAG)
     notes = [note for analysis in analyses for note in analysis.notes]
     for note in notes:
         print(f'analyze: {note}', file=sys.stderr)
@@ -42,8 +41,7 @@ def analyze(arguments: Sequence[str] | None = None) -> int:
     try:
         page = _write(folder, bags, analyses)
     except OSError as error:
-        print(f"analyze: error: cannot write to '{folder}': {error.strerror}", file=sys.stderr)
-        return BAD_BAG
+        return refuse('analyze', f"cannot write to '{folder}': {error.strerror}", BAD_BAG)
     for analysis in analyses:
         print(as_text(analysis.result))
     print(f'report: {page}')
