@@ -85,6 +85,23 @@ def test_a_stage_that_falls_silent_is_noticed(live: Live, monkeypatch: pytest.Mo
     assert 'no sample for 7 s' in status_html(live)
 
 
+def test_what_a_controller_said_that_is_gone_is_not_shown_as_now(run: Run, live: Live) -> None:
+    assert '– of 7 A' not in motors_html(live, 7.0)
+    later = decode('measurement', [Encoder().message(run, 'measurement', 0)]).copy()
+    for sequence, known in ((SAMPLES + 900, True), (SAMPLES + 1100, False)):
+        later['sequence'] = sequence
+        live.take('measurement', later)
+        assert ('controller regulating' in status_html(live)) == known
+        assert (live.phase != '') == (live.reference is not None) == known
+        assert ('– of 7 A' not in motors_html(live, 7.0)) == known
+    for key in ('currents', 'reference', 'controller'):
+        block = decode(key, [Encoder().message(run, key, SAMPLES - 1)]).copy()
+        block['sequence'] = SAMPLES + 1100
+        live.take(key, block)
+    assert 'controller regulating' in status_html(live)
+    assert '– of 7 A' not in motors_html(live, 7.0)
+
+
 def test_bars_are_full_at_the_limit(live: Live) -> None:
     live.currents = np.array([0.0, 3.5, 7.0, 70.0])
     live.load = np.array([0.25, 0.5, 1.0, 1.2])

@@ -28,6 +28,7 @@ REMEDIES = {
 }
 """Of a controller, by its mode; a stage says its own."""
 
+_FORGOTTEN = 1.0  # what was said of samples so much older than the newest [s]
 _PACE_TIME = 1.0  # over which the real-time factor is taken, wall clock [s]
 
 
@@ -50,8 +51,8 @@ class Live:
         self.outputs: FloatArray | None = None
         self.reference: FloatArray | None = None
         """Where the platen is and shall be: y, x, z, phi, theta [m, rad]."""
-        self.currents = np.zeros(4)
-        """Amplitudes of the motors' phase currents [A]."""
+        self.currents: FloatArray | None = None
+        """Amplitudes of the motors' phase currents [A], where somebody commands any."""
         self.load: FloatArray | None = None
         """Used share of each motor amplifier's thermal budget, where that is known."""
         self.phase = self.mode = ''
@@ -65,12 +66,14 @@ class Live:
         self.planned: Track[Vector] = Track(points, step)
         self._mark: tuple[int, int] | None = None
         self._heard = -math.inf
+        self._told_of: dict[str, int] = {}  # number of the last sample, by topic key
 
     def take(self, key: str, rows: Records) -> None:
         """Take decoded samples of one topic, by its key."""
         if not len(rows):
             return
         last = rows[-1]
+        self._told_of[key] = int(last['sequence'])
         if key == 'measurement':
             self._measured(last)
         elif key == 'controller':
@@ -113,6 +116,18 @@ class Live:
             where, _ = platen_pose(outputs)
             self.flown.add(where, lambda: where)
         self._keep_pace(self.sequence, int(last['wall_time']))
+        self._forget()
+
+    def _forget(self) -> None:
+        """What nobody says any more, as of a controller that is gone."""
+        oldest = self.sequence - round(_FORGOTTEN / self._parameters.sample_time)
+        gone = {key for key, told_of in self._told_of.items() if told_of < oldest}
+        if 'controller' in gone:
+            self.mode, self.reference = '', None
+        if 'currents' in gone:
+            self.currents = None
+        if 'reference' in gone:
+            self.phase = ''
 
     def _controlled(self, rows: Records) -> None:
         last = rows[-1]

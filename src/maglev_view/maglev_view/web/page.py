@@ -106,7 +106,7 @@ class Page:
 
     def _show_slowly(self, live: Live) -> None:
         peak = self._parameters.peak_current
-        self._scene.colour(live.currents / peak)
+        self._scene.colour(np.zeros(4) if live.currents is None else live.currents / peak)
         self._scene.draw(live.flown.points, live.planned.points)
         self._status.content = status_html(live)
         self._motors.content = motors_html(live, peak)

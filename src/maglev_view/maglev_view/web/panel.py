@@ -63,9 +63,12 @@ def motors_html(live: Live, peak: float) -> str:
     """A bar for the current of each motor, over ``peak`` [A], and one for its thermal load."""
     rows = []
     for motor in range(4):
-        current = float(live.currents[motor])
         cells = f'<td style="{_CELL}">motor {motor + 1}</td>'
-        cells += _bar(current / peak, f'{current:.2f} of {peak:g} A')
+        if live.currents is None:
+            cells += _bar(0.0, f'– of {peak:g} A')
+        else:
+            current = float(live.currents[motor])
+            cells += _bar(current / peak, f'{current:.2f} of {peak:g} A')
         if live.load is not None:
             load = float(live.load[motor])
             cells += _bar(load, f'heat {100.0 * load:.0f} %')
