@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 from bench import HOVER, ZERO, Bench
+from paper_motor import L_h
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import MeasurementFault
 from maglev_controller.step.sample import answer_sample
 from maglev_model.axes import AXES
 from maglev_model.machine import MachineParameters, machine_constants
-from maglev_model.motor import L_h
 from maglev_model.parameters import build, from_yaml, read_yaml, specs
 
 PARAMS = Path(__file__).resolve().parents[2] / 'params'
@@ -148,7 +148,7 @@ def test_the_paper_law_is_equations_14_to_17() -> None:
     rng = np.random.default_rng(3)
     phi, unit, E = design.model.state, np.array([0.0, 0.0, 1.0]), np.full(3, 7e-5)
     machine = machine_constants(MachineParameters())
-    h_x, saturated = -machine.C_x * 2.0 * L_h(machine, 0.025), 0  # (11)
+    h_x, saturated = -machine.K_h / machine.M_x * 2.0 * L_h(machine, 0.025), 0  # (11)
     for k in range(60):
         error = 0.045 * np.sin(0.3 * k) + 1e-3 * rng.normal()
         bench.step(x=error)

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 from graph import Nodes, Observer, executable
+from paper_motor import vertical_force
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 
 from maglev_model.geometry import motor_gaps
 from maglev_model.machine import MachineParameters, machine_constants
-from maglev_model.motor import vertical_force
 from maglev_msgs.msg import ControllerState, Currents, Measurement
 from maglev_node.polling import PolledSubscription
 from maglev_node.stamp import nanoseconds, set_stamp

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from bridge_flight import OMEGA, Flight, ellipse, hover
+from paper_motor import vertical_force
 
 from maglev_hw_bridge.landing import impact_of_cut, impacts_of_cut
 from maglev_hw_bridge.parameters import BridgeParameters
@@ -12,7 +13,6 @@ from maglev_hw_bridge.stage import Mode
 from maglev_model.currents import exact_currents
 from maglev_model.inverse import CurrentLimits
 from maglev_model.machine import machine_constants
-from maglev_model.motor import vertical_force
 from maglev_model.parameters import ParameterError, build
 
 SOFT = 0.05  # [m/s]

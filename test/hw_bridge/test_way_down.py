@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from paper_motor import vertical_force
 from scipy.integrate import solve_ivp
 
 from maglev_hw_bridge.landing import Landing, impact_of_cut, impacts_of_cut
@@ -16,7 +17,6 @@ from maglev_model.axes import THETA, X, Z
 from maglev_model.currents import exact_currents
 from maglev_model.inverse import CurrentLimits
 from maglev_model.machine import machine_constants
-from maglev_model.motor import vertical_force
 from maglev_model.parameters import build
 from maglev_model.platen import output_accelerations
 from maglev_model.quintic import quintic_to_zero

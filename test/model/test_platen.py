@@ -9,11 +9,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from paper_motor import L_h, L_v1, L_v2, L_v3, horizontal_force, vertical_force
 
 from maglev_model.geometry import motor_gaps, outputs_of_gaps
 from maglev_model.machine import MachineParameters, machine_constants
-from maglev_model.motor import L_h, L_v1, L_v2, L_v3, horizontal_force, vertical_force
-from maglev_model.platen import accelerations, affine_terms, gaps_from_outputs, outputs_from_gaps
+from maglev_model.platen import (
+    affine_terms,
+    gaps_from_outputs,
+    output_accelerations,
+    outputs_from_gaps,
+)
 
 M = machine_constants(MachineParameters())
 OUTPUTS = st.tuples(
@@ -37,9 +42,9 @@ def _by_the_paper(
     """(6), (7) as printed, term by term."""
     g1, g2, g3, g4 = _gaps(y, phi, theta)
     u1, u2, u3, u4 = u_y
-    k1 = [M.C_v1 * L_v1(M, g) for g in (g1, g2, g3, g4)]
-    k2 = [M.C_v2 * L_v2(M, g) for g in (g1, g2, g3, g4)]
-    k3 = [M.C_v3 * L_v3(M, g) for g in (g1, g2, g3, g4)]
+    k1 = [M.K_v1 / M.M_y * L_v1(M, g) for g in (g1, g2, g3, g4)]
+    k2 = [M.K_v2 / M.M_y * L_v2(M, g) for g in (g1, g2, g3, g4)]
+    k3 = [M.K_v3 / M.M_y * L_v3(M, g) for g in (g1, g2, g3, g4)]
     y_dd = M.G - k1[2] - k1[0] - k1[1] - k1[3]
     y_dd += k2[2] * u3 + k2[0] * u1 + k2[1] * u2 + k2[3] * u4
     y_dd -= (k3[2] + k3[0]) * u_z**2 + k3[2] * u3**2 + k3[0] * u1**2
@@ -48,17 +53,14 @@ def _by_the_paper(
     phi_dd = M.k_rot * (phi_dd - (k3[2] - k3[0]) * u_z**2) - M.k_s_phi * phi
     theta_dd = -k1[1] + k2[1] * u2 - k3[1] * u2**2 + k1[3] - k2[3] * u4 + k3[3] * u4**2
     theta_dd = M.k_rot * (theta_dd - (k3[1] - k3[3]) * u_x**2) - M.k_s_theta * theta
-    x_dd = -M.C_x * (L_h(M, g2) + L_h(M, g4)) * u_x
-    z_dd = -M.C_z * (L_h(M, g3) + L_h(M, g1)) * u_z
+    x_dd = -M.K_h / M.M_x * (L_h(M, g2) + L_h(M, g4)) * u_x
+    z_dd = -M.K_h / M.M_z * (L_h(M, g3) + L_h(M, g1)) * u_z
     return [y_dd, x_dd, z_dd, phi_dd, theta_dd]
 
 
 def _accelerations(output: tuple[float, ...], i_d: list[float], i_q: list[float]) -> list[float]:
-    state = np.zeros(10)
-    state[::2] = output
-    result = np.empty(5)
-    accelerations(M, state, np.array(i_d), np.array(i_q), result)
-    return list(result)
+    y, _, _, phi, theta = output
+    return list(output_accelerations(M, y, phi, theta, np.array(i_d), np.array(i_q)))
 
 
 @settings(max_examples=100)

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from paper_motor import horizontal_force, vertical_force
 
 from maglev_model.inverse import CURRENT, LEVITATION, Answer, CurrentLimits, exact_inverse
 from maglev_model.machine import MachineParameters, machine_constants
-from maglev_model.motor import attraction_coefficients, horizontal_force, vertical_force
-from maglev_model.platen import accelerations
+from maglev_model.motor import attraction_coefficients
+from maglev_model.platen import output_accelerations
 
 MACHINE = machine_constants(MachineParameters(motors=1, mass_y=1.725, mass_x=5.3))
 BOTH = np.array([1.0, 1.0, 0.0, 0.0, 0.0])
@@ -41,13 +42,11 @@ def test_it_is_four_motors_that_carry_four_and_two_times_the_mass(
 ) -> None:
     """One motor with (1), (2) is all four of (6) with equal currents, per its share of mass."""
     four = machine_constants(MachineParameters(mass_y=4.0 * 1.725, mass_x=2.0 * 5.3))
-    state, single, full = np.zeros(10), np.empty(5), np.empty(5)
-    state[0] = gap
     only = np.array([0.0, 1.0, 0.0, 0.0])
-    accelerations(MACHINE, state, i_d * only, i_q * only, single)
-    accelerations(four, state, np.full(4, i_d), np.full(4, i_q), full)
+    single = output_accelerations(MACHINE, gap, 0.0, 0.0, i_d * only, i_q * only)
+    full = output_accelerations(four, gap, 0.0, 0.0, np.full(4, i_d), np.full(4, i_q))
     np.testing.assert_allclose(single[:2], full[:2], rtol=1e-12, atol=1e-12)
-    assert not single[2:].any()
+    assert not any(single[2:])
 
 
 @settings(max_examples=60)

@@ -9,20 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from paper_motor import L_h, L_v1, L_v2, L_v3, vertical_force
 from scipy.integrate import DOP853
 
 from maglev_model.compiled import compiled
 from maglev_model.contract.stage import EncoderSample
 from maglev_model.machine import Machine, MachineParameters, machine_constants
-from maglev_model.motor import (
-    L_h,
-    L_v1,
-    L_v2,
-    L_v3,
-    attraction_coefficients,
-    force_coefficients,
-    vertical_force,
-)
+from maglev_model.motor import attraction_coefficients, force_coefficients
 from maglev_model.parameters import build, read_yaml
 from maglev_plant.dynamics import advance
 from maglev_plant.encoder import encode
@@ -74,14 +67,14 @@ def _printed_dynamics(m: Machine, s: FloatArray, c: FloatArray) -> FloatArray:
     gap = s[0] + m.r * np.array([-math.sin(s[6]), math.sin(s[8]), math.sin(s[6]), -math.sin(s[8])])
     down, along = np.empty(4), np.empty(4)
     for i in range(4):
-        down[i] = -m.C_v1 * L_v1(m, gap[i]) + m.C_v2 * L_v2(m, gap[i]) * c[i]
-        down[i] -= m.C_v3 * L_v3(m, gap[i]) * (c[i] ** 2 + c[4 + i] ** 2)
+        down[i] = -m.K_v1 / m.M_y * L_v1(m, gap[i]) + m.K_v2 / m.M_y * L_v2(m, gap[i]) * c[i]
+        down[i] -= m.K_v3 / m.M_y * L_v3(m, gap[i]) * (c[i] ** 2 + c[4 + i] ** 2)
         along[i] = L_h(m, gap[i]) * c[4 + i]
     rate = np.empty(10)
     rate[0::2] = s[1::2]
     rate[1] = m.G + down.sum()
-    rate[3] = -m.C_x * (along[1] + along[3])
-    rate[5] = -m.C_z * (along[0] + along[2])
+    rate[3] = -m.K_h / m.M_x * (along[1] + along[3])
+    rate[5] = -m.K_h / m.M_z * (along[0] + along[2])
     rate[7] = m.k_rot * (down[2] - down[0]) - m.k_s_phi * s[6]
     rate[9] = m.k_rot * (down[1] - down[3]) - m.k_s_theta * s[8]
     return rate

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from maglev_model.inverse import Answer, CurrentLimits
 from maglev_model.machine import MachineParameters, machine_constants
-from maglev_model.platen import accelerations
+from maglev_model.platen import output_accelerations
 
 MACHINE = machine_constants(MachineParameters())
 ALL = np.ones(5)
@@ -48,7 +48,7 @@ class Answered:
         self.realised, self.excess = np.zeros(5), np.zeros(2)
         answer = Answer(self.direct, self.quadrature, self.realised, self.excess)
         self.limited_by = inverse(MACHINE, limits, controlled, output, wanted, answer)
-        state = np.zeros(10)
-        state[::2] = output
-        self.plant = np.zeros(5)
-        accelerations(MACHINE, state, self.direct, self.quadrature, self.plant)
+        y, _, _, phi, theta = output
+        self.plant = np.array(
+            output_accelerations(MACHINE, y, phi, theta, self.direct, self.quadrature)
+        )

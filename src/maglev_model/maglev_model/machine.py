@@ -126,11 +126,6 @@ class Machine(NamedTuple):
     K_v2: float
     K_v3: float
     K_h: float  # (4)
-    C_v1: float  # K_v1 / M_y, (6)
-    C_v2: float
-    C_v3: float
-    C_x: float  # K_h / M_x
-    C_z: float  # K_h / M_z
     b_0: float
     t_1: float
     tau: float
@@ -178,11 +173,6 @@ def machine_constants(parameters: MachineParameters) -> Machine:
         K_v2=K_v2,
         K_v3=K_v3,
         K_h=K_h,
-        C_v1=K_v1 / p.mass_y,
-        C_v2=K_v2 / p.mass_y,
-        C_v3=K_v3 / p.mass_y,
-        C_x=K_h / p.mass_x,
-        C_z=K_h / p.mass_z,
         b_0=p.slot_width,
         t_1=p.slot_pitch,
         tau=tau,

@@ -17,7 +17,7 @@ MachineArray = Annotated[NDArray[np.float64], FIELDS]
 
 
 def machine_to_array(machine: Machine) -> NDArray[np.float64]:
-    """The constants in one array, shape (25,), for :func:`machine_from_array`."""
+    """The constants in one array, shape (20,), for :func:`machine_from_array`."""
     return np.array(machine, dtype=np.float64)
 
 
@@ -33,6 +33,4 @@ def machine_from_array(array: NDArray[np.float64]) -> Machine:
     Each element by itself: what a caller does not use costs nothing then, and the whole a hundredth
     of what Numba's own tuple of an array takes.
     """
-    return Machine(
-        *_five(array, 0), *_five(array, 5), *_five(array, 10), *_five(array, 15), *_five(array, 20)
-    )
+    return Machine(*_five(array, 0), *_five(array, 5), *_five(array, 10), *_five(array, 15))

@@ -18,103 +18,28 @@ from maglev_model.machine import Machine
 
 
 @borrowing
-def slot_factor(machine: Machine, gap: float) -> float:
-    """Factor ``γ_1(g)`` of (4), without unit; ``gap`` [m]."""
-    u = machine.b_0 / (2.0 * gap)
-    return 4.0 / math.pi * (u * math.atan(u) - 0.5 * math.log(1.0 + u * u))
+def force_coefficients(machine: Machine, gap: float) -> tuple[float, float, float, float]:
+    """What multiplies the currents at one gap [m]: ``k_1``, ``k_2``, ``k_3``, ``k_h``.
 
-
-@borrowing
-def carter_coefficient(machine: Machine, gap: float) -> float:
-    """Carter's coefficient ``K_c(g)`` of (4), without unit; ``gap`` [m]."""
-    return machine.t_1 / (machine.t_1 - gap * slot_factor(machine, gap))
-
-
-@borrowing
-def slot_permeance(machine: Machine, gap: float) -> float:
-    """Relative permeance ``λ̃(g)`` of the slotted stator, (4), without unit; ``gap`` [m]."""
-    depth = gap + machine.b_0 / 2.0 + machine.h_m / machine.mu_rec
-    return 1.0 - machine.b_0**2 / (4.0 * machine.t_1 * depth)
-
-
-@borrowing
-def magnet_field(machine: Machine, gap: float) -> float:
-    """The magnets' field at the stator ``B_pmy1(g)`` [T]; ``gap`` [m]."""
-    return machine.B_0 / math.sinh(math.pi / machine.tau * (machine.h_m + gap))
-
-
-@borrowing
-def L_v1(machine: Machine, gap: float) -> float:  # noqa: N802
-    """``L_v1(g)`` of (3) [T²]; ``gap`` [m]."""
-    return slot_permeance(machine, gap) * magnet_field(machine, gap) ** 2
-
-
-@borrowing
-def L_v2(machine: Machine, gap: float) -> float:  # noqa: N802
-    """``L_v2(g)`` of (3) [T]; ``gap`` [m]."""
-    coth = 1.0 / math.tanh(math.pi / machine.tau * (machine.h_m + gap))
-    field = slot_permeance(machine, gap) * magnet_field(machine, gap)
-    return field * coth / carter_coefficient(machine, gap)
-
-
-@borrowing
-def L_v3(machine: Machine, gap: float) -> float:  # noqa: N802
-    """``L_v3(g)`` of (3), without unit; ``gap`` [m]."""
-    coth = 1.0 / math.tanh(math.pi / machine.tau * (machine.h_m + gap))
-    return slot_permeance(machine, gap) * (coth / carter_coefficient(machine, gap)) ** 2
-
-
-@borrowing
-def L_h(machine: Machine, gap: float) -> float:  # noqa: N802
-    """``L_h(g)`` of (4), without unit; ``gap`` [m]."""
-    sinh = math.sinh(math.pi / machine.tau * (machine.h_m + gap))
-    return slot_permeance(machine, gap) / (carter_coefficient(machine, gap) * sinh)
-
-
-@borrowing
-def horizontal_force(machine: Machine, gap: float, i_q: float) -> float:
-    """Horizontal force ``F_H`` on the mover [N], (1); ``gap`` [m], ``i_q`` [A]."""
-    return -machine.K_h * L_h(machine, gap) * i_q
-
-
-@borrowing
-def vertical_force(machine: Machine, gap: float, i_d: float, i_q: float) -> float:
-    """Vertical force ``F_V`` on the mover [N], positive downward, (2); [m], [A]."""
-    return (
-        -machine.K_v1 * L_v1(machine, gap)
-        + machine.K_v2 * L_v2(machine, gap) * i_d
-        - machine.K_v3 * L_v3(machine, gap) * (i_d * i_d + i_q * i_q)
-    )
-
-
-@borrowing
-def gap_functions(machine: Machine, gap: float) -> tuple[float, float, float, float]:
-    """``L_v1, L_v2, L_v3, L_h`` at one gap [m] from one evaluation of what they share."""
+    ``K_v1·L_v1`` [N], ``K_v2·L_v2`` [N/A], ``K_v3·L_v3`` [N/A²] and ``K_h·L_h`` [N/A], (3), (4),
+    from one evaluation of what they share. Then
+    ``F_V = -k_1 + k_2·i_d - k_3·(i_d² + i_q²)`` and ``F_H = -k_h·i_q``, (1), (2).
+    """
     e = math.exp(math.pi / machine.tau * (machine.h_m + gap))
     sinh = 0.5 * (e - 1.0 / e)
     coth = 0.5 * (e + 1.0 / e) / sinh
     u = machine.b_0 / (2.0 * gap)
     gamma_1 = 4.0 / math.pi * (u * math.atan(u) - 0.5 * math.log(1.0 + u * u))
     winding = coth * (1.0 - gap * gamma_1 / machine.t_1)  # coth / K_c
-    magnet = machine.B_0 / sinh  # B_pmy1
-    permeance = slot_permeance(machine, gap)
+    magnet = machine.B_0 / sinh  # B_pmy1 [T]
+    depth = gap + machine.b_0 / 2.0 + machine.h_m / machine.mu_rec
+    permeance = 1.0 - machine.b_0**2 / (4.0 * machine.t_1 * depth)  # λ̃
     return (
-        permeance * magnet * magnet,
-        permeance * magnet * winding,
-        permeance * winding * winding,
-        permeance * winding / (coth * sinh),
+        machine.K_v1 * (permeance * magnet * magnet),
+        machine.K_v2 * (permeance * magnet * winding),
+        machine.K_v3 * (permeance * winding * winding),
+        machine.K_h * (permeance * winding / (coth * sinh)),
     )
-
-
-@borrowing
-def force_coefficients(machine: Machine, gap: float) -> tuple[float, float, float, float]:
-    """What multiplies the currents at one gap [m]: ``k_1``, ``k_2``, ``k_3``, ``k_h``.
-
-    ``K_v1·L_v1`` [N], ``K_v2·L_v2`` [N/A], ``K_v3·L_v3`` [N/A²] and ``K_h·L_h`` [N/A]. Then
-    ``F_V = -k_1 + k_2·i_d - k_3·(i_d² + i_q²)`` and ``F_H = -k_h·i_q``, (1), (2).
-    """
-    l_v1, l_v2, l_v3, l_h = gap_functions(machine, gap)
-    return machine.K_v1 * l_v1, machine.K_v2 * l_v2, machine.K_v3 * l_v3, machine.K_h * l_h
 
 
 @borrowing

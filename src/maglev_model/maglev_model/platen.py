@@ -1,6 +1,6 @@
 """Geometry (5) and dynamics (6), (7), (9) of the platen, as compiled functions.
 
-States are x1..x10 of Table II, outputs y, x, z, phi, theta. Motors 1 and 3 lie along Z (phi, u_z),
+Outputs are y, x, z, phi, theta. Motors 1 and 3 lie along Z (phi, u_z),
 motors 2 and 4 along X (theta, u_x). Every motor has its own two currents; the paper's u_x is the
 i_q of 2 and 4, its u_z that of 1 and 3.
 """
@@ -98,7 +98,7 @@ def output_accelerations(
     """Accelerations of y, x, z, phi, theta [m/s², rad/s²] by (6), (7), from what they depend on.
 
     ``y`` [m], ``phi``, ``theta`` [rad]; ``i_d``, ``i_q`` [A], shape (4,). Of a machine with a
-    single motor, only y and x move.
+    single motor, only y and x move. No friction, no stops: the bare platen.
     """
     g_1, g_2, g_3, g_4 = motor_gaps(machine, y, phi, theta)
     v_1, h_1 = _motor_forces(machine, g_1, i_d[0], i_q[0])
@@ -106,20 +106,6 @@ def output_accelerations(
     v_3, h_3 = _motor_forces(machine, g_3, i_d[2], i_q[2])
     v_4, h_4 = _motor_forces(machine, g_4, i_d[3], i_q[3])
     return balance(machine, phi, theta, (v_1, v_2, v_3, v_4), (h_1, h_2, h_3, h_4))
-
-
-@borrowing
-def accelerations(
-    machine: Machine, state: FloatArray, i_d: FloatArray, i_q: FloatArray, out: FloatArray
-) -> None:
-    """Accelerations of y, x, z, phi, theta [m/s², rad/s²] by the full model (6), (7).
-
-    ``state`` x1..x10, shape (10,); ``i_d``, ``i_q`` [A], shape (4,); ``out``, shape (5,), is
-    written. No friction, no stops: the bare platen.
-    """
-    out[0], out[1], out[2], out[3], out[4] = output_accelerations(
-        machine, state[0], state[6], state[8], i_d, i_q
-    )
 
 
 @borrowing

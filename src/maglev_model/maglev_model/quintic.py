@@ -16,9 +16,6 @@ PEAK_VELOCITY = 15.0 / 8.0
 PEAK_ACCELERATION = 10.0 / math.sqrt(3.0)
 """Its peak acceleration, in distance / duration²."""
 
-PEAK_JERK = 60.0
-"""Its peak jerk, in distance / duration³."""
-
 
 def _highest_coefficients(distance: Any, v_0: Any, v_1: Any, a_0: Any, a_1: Any) -> Any:
     """c_3, c_4, c_5 of the quintic over s = t / T; velocities times T, accelerations times T²."""
@@ -108,16 +105,6 @@ def minimum_jerk(share: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]
 def transition_time(distance: float, acceleration: float, least: float) -> float:
     """Duration [s] of a minimum-jerk transition within ``acceleration``, at least ``least``."""
     return max(least, math.sqrt(PEAK_ACCELERATION * abs(distance) / acceleration))
-
-
-def minimum_jerk_peaks(distance: float, time: float) -> tuple[float, float, float]:
-    """Peak speed, acceleration and jerk of a minimum-jerk move of ``distance`` in ``time`` [s]."""
-    size = abs(distance)
-    return (
-        PEAK_VELOCITY * size / time,
-        PEAK_ACCELERATION * size / time**2,
-        PEAK_JERK * size / time**3,
-    )
 
 
 def minimum_jerk_time(distance: float, velocity: float, acceleration: float) -> float:

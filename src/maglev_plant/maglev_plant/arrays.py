@@ -95,11 +95,6 @@ def true_machine(parameters: PlantParameters) -> Machine:
         K_v2=machine.K_v2 * offset.K_v2,
         K_v3=machine.K_v3 * offset.K_v3,
         K_h=machine.K_h * offset.K_h,
-        C_v1=machine.C_v1 * offset.K_v1,
-        C_v2=machine.C_v2 * offset.K_v2,
-        C_v3=machine.C_v3 * offset.K_v3,
-        C_x=machine.C_x * offset.K_h,
-        C_z=machine.C_z * offset.K_h,
     )
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from maglev_model.axes import FloatArray
 from maglev_model.geometry import motor_gaps
 from maglev_model.machine import Machine, MachineParameters, machine_constants
-from maglev_model.motor import horizontal_force, vertical_force
+from maglev_model.motor import force_coefficients, forces_of_currents
 from maglev_view.frames import Motor, Vector, motors, mover_position
 
 
@@ -48,8 +48,8 @@ class Forces:
     ) -> Force:
         index = motor.number - 1
         gap, direct, quadrature = float(gaps[index]), float(i_d[index]), float(i_q[index])
-        down = vertical_force(self._machine, gap, direct, quadrature)
-        push = horizontal_force(self._machine, gap, quadrature)
+        coefficients = force_coefficients(self._machine, gap)
+        down, push = forces_of_currents(coefficients, direct, quadrature)
         x, y, _ = motor.direction
         newtons = (push * x, push * y, -down)
         return Force(motor, mover_position(motor, outputs), newtons, math.hypot(direct, quadrature))

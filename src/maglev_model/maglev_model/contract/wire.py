@@ -31,83 +31,74 @@ class Field(NamedTuple):
 
 
 class TopicType(NamedTuple):
-    """One topic of a run: a short key, its message type and the fields behind the header."""
+    """One topic of a run: its message type and the fields behind the header."""
 
-    key: str
     message_type: str
     fields: tuple[Field, ...]
 
 
 TOPIC_TYPES = {
-    topic.key: topic
-    for topic in (
-        TopicType(
-            'reference',
-            'maglev_msgs/msg/Reference',
-            (
-                Field('sequence', '<u8'),
-                Field('phase', '<u1'),
-                Field('segment', '<u4'),
-                Field('position', '<f8', 5),
-                Field('velocity', '<f8', 5),
-                Field('acceleration', '<f8', 5),
-                Field('target', '<f8', 5),
-                Field('session', '<u8', added=1),
-            ),
+    'reference': TopicType(
+        'maglev_msgs/msg/Reference',
+        (
+            Field('sequence', '<u8'),
+            Field('phase', '<u1'),
+            Field('segment', '<u4'),
+            Field('position', '<f8', 5),
+            Field('velocity', '<f8', 5),
+            Field('acceleration', '<f8', 5),
+            Field('target', '<f8', 5),
+            Field('session', '<u8', added=1),
         ),
-        TopicType(
-            'measurement',
-            'maglev_msgs/msg/Measurement',
-            (
-                Field('sequence', '<u8'),
-                Field('gap', '<f8', 4),
-                Field('x', '<f8'),
-                Field('z', '<f8'),
-                Field('late_samples', '<u8'),
-                Field('wall_time', '<u8', added=1),
-                Field('lockstep', '?', added=1),
-                Field('controller', '<u8', added=2),
-            ),
+    ),
+    'measurement': TopicType(
+        'maglev_msgs/msg/Measurement',
+        (
+            Field('sequence', '<u8'),
+            Field('gap', '<f8', 4),
+            Field('x', '<f8'),
+            Field('z', '<f8'),
+            Field('late_samples', '<u8'),
+            Field('wall_time', '<u8', added=1),
+            Field('lockstep', '?', added=1),
+            Field('controller', '<u8', added=2),
         ),
-        TopicType(
-            'currents',
-            'maglev_msgs/msg/Currents',
-            (
-                Field('sequence', '<u8'),
-                Field('direct_current', '<f8', 4),
-                Field('quadrature_current', '<f8', 4),
-                Field('session', '<u8', added=1),
-                Field('status', '<u1', added=1),
-            ),
+    ),
+    'currents': TopicType(
+        'maglev_msgs/msg/Currents',
+        (
+            Field('sequence', '<u8'),
+            Field('direct_current', '<f8', 4),
+            Field('quadrature_current', '<f8', 4),
+            Field('session', '<u8', added=1),
+            Field('status', '<u1', added=1),
         ),
-        TopicType(
-            'controller',
-            'maglev_msgs/msg/ControllerState',
-            (
-                Field('sequence', '<u8'),
-                Field('mode', '<u1'),
-                Field('saturated', '?'),
-                Field('position', '<f8', 5),
-                Field('error', '<f8', 5),
-                Field('error_rate', '<f8', 5),
-                Field('virtual_input', '<f8', 5),
-                Field('internal_model', '<f8', 5),
-                Field('limited_by', '<u1', added=1),
-            ),
+    ),
+    'controller': TopicType(
+        'maglev_msgs/msg/ControllerState',
+        (
+            Field('sequence', '<u8'),
+            Field('mode', '<u1'),
+            Field('saturated', '?'),
+            Field('position', '<f8', 5),
+            Field('error', '<f8', 5),
+            Field('error_rate', '<f8', 5),
+            Field('virtual_input', '<f8', 5),
+            Field('internal_model', '<f8', 5),
+            Field('limited_by', '<u1', added=1),
         ),
-        TopicType(
-            'plant',
-            'maglev_msgs/msg/PlantState',
-            (
-                Field('sequence', '<u8'),
-                Field('state', '<f8', 10),
-                Field('direct_current', '<f8', 4),
-                Field('quadrature_current', '<f8', 4),
-                Field('thermal_load', '<f8', 4),
-                Field('own_length', '<f8', 6, added=1),
-            ),
+    ),
+    'plant': TopicType(
+        'maglev_msgs/msg/PlantState',
+        (
+            Field('sequence', '<u8'),
+            Field('state', '<f8', 10),
+            Field('direct_current', '<f8', 4),
+            Field('quadrature_current', '<f8', 4),
+            Field('thermal_load', '<f8', 4),
+            Field('own_length', '<f8', 6, added=1),
         ),
-    )
+    ),
 }
 """The topics of a run by key: reference, measurement, currents, controller, plant."""
 
