@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from maglev_model.axes import THETA, X, Y
-from maglev_model.parameters import ParameterError
+from maglev_model.parameters import ParameterError, build
+from maglev_plant.parameters import PlantParameters
+from maglev_study.closed_loop import at_stops
 from maglev_study.comparison import experiments, region
 from maglev_study.comparison.contestants import find_contestants
 from maglev_study.comparison.experiments import Row, StepExperiment
@@ -114,6 +116,12 @@ def test_a_platen_at_a_stop_is_lost() -> None:
     tilted = low.copy()
     tilted[THETA] = 0.0101  # the seats at 0.1 m come to 18 mm
     assert level.step(low, tilted, 1.0, 2.0) is None
+
+
+def test_seats_meet_a_stop_also_where_the_gap_is_locked() -> None:
+    plant = build(PlantParameters, {'guide.locked': (True, False, False, False, False)})
+    low, tilted = np.array([0.019, 0.0, 0.0, 0.0, 0.0]), np.array([0.019, 0.0, 0.0, 0.0, 0.0101])
+    assert at_stops(plant)(np.stack([low, tilted])).tolist() == [False, True]
 
 
 def test_region_of_the_default_and_of_the_linear_law(monkeypatch: pytest.MonkeyPatch) -> None:
