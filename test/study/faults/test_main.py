@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import textwrap
 import time
 from pathlib import Path
 
@@ -14,6 +15,8 @@ import pytest
 
 from maglev_study.command import INTERRUPTED, WRONG_USE
 from maglev_study.faults.draw import from_json, scenario, to_json
+from maglev_study.faults.fly import Scenario
+from maglev_study.faults.kinds import Fault
 from maglev_study.faults.main import BROKEN, PASS, run
 
 
@@ -57,6 +60,7 @@ def test_a_file_without_a_run_is_refused(
         ('machine: {gap_max: 0.030}', "'machine.gap_max' is 0.03"),
         ('machine: {mass_y: -7.0}', "'machine.mass_y' is -7"),
         ('fault: {jmup: 1.0}', "'fault.jmup'"),
+        ('encoder: {resolution: [1e-5, 1e-5, 1e-5, 2e-5, 1e-5, 1e-5]}', "'encoder.resolution'"),
     ],
 )
 def test_a_machine_that_cannot_fly_the_programme_is_refused(
@@ -67,6 +71,35 @@ def test_a_machine_that_cannot_fly_the_programme_is_refused(
     options = ['--runs', '1', '--overlay', str(path), '--out', str(tmp_path)]
     assert run(options) == WRONG_USE
     assert named in capsys.readouterr().err
+
+
+def test_the_emulated_machine_is_wired_as_a_bridge_of_ones_own_has_it(tmp_path: Path) -> None:
+    mine = """
+    /**: {ros__parameters: {machine: {mass_y: 7.2}}}
+    hw_bridge:
+      ros__parameters:
+        driver: quanser
+        homing: {at_start: false, x: 0.01, z: -0.01}
+        boards: {identifier: ['1', '0'], stop_input: 3, memory: %s/memory.json}
+        encoder:
+          channel: [5, 4, 3, 2, 1, 0]
+          direction: [-1, 1, 1, 1, 1, -1]
+          resolution: [1.0e-6, 1.0e-6, 1.0e-6, 1.0e-6, 5.0e-6, 5.0e-6]
+        amplifier:
+          channel: [5, 4, 3, 2, 1, 0, 0, 1, 2, 3, 4, 5]
+          gain: [2.0, 2.0, 2.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]
+          sign: [1, 1, -1, 1, 1, 1, 1, 1, 1, 1, 1, 1]
+        commutation: {offset: [0.5, 0.0, 0.0, -1.0]}
+    """
+    path = tmp_path / 'mine.yaml'
+    path.write_text(textwrap.dedent(mine) % tmp_path, encoding='utf-8')
+    faults = [('none', 'ellipse'), ('controller: killed', 'hover')]
+    for kind, phase in faults:
+        run_ = to_json(Scenario(1, phase, 0.5, (Fault(kind),), 1))
+        (tmp_path / 'run.json').write_text(json.dumps(run_), encoding='utf-8')
+        options = ['--replay', str(tmp_path / 'run.json'), '--overlay', str(path)]
+        assert run([*options, '--out', str(tmp_path / 'out')]) == PASS
+    assert not (tmp_path / 'memory.json').exists()
 
 
 def test_a_folder_that_cannot_be_is_refused(tmp_path: Path) -> None:

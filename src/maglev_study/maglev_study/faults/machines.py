@@ -30,6 +30,8 @@ _STREAM = 7919  # keeps these draws apart from all others that have the same num
 
 _COMMON: dict[str, object] = {
     'driver': 'emulated',
+    'boards.memory': '',
+    'boards.identifier': ('0', '1'),
     'homing.x': 0.0,
     'homing.z': 0.0,
     'boards.stop_input': STOP_INPUT,
@@ -63,6 +65,12 @@ def _check_room(bridge: BridgeParameters) -> None:
             f"parameter 'sample_time' is {bridge.sample_time:g}: the programme that is flown has"
             f' samples of {PERIOD:g} s'
         )
+    *gaps, x, z = bridge.encoder.resolution
+    if len(set(gaps)) > 1 or x != z:
+        raise ParameterError(
+            "parameter 'encoder.resolution': the emulated machine has one of all gaps, and one of"
+            ' x and z'
+        )
     for name, (lower, upper) in ROOM.items():
         value = getattr(bridge.machine, name)
         if not lower <= value <= upper:
@@ -79,8 +87,9 @@ PLAIN = believed()
 def machine(number: int, believed: Believed = PLAIN) -> BridgeParameters:
     """Parameters of the bridge, with those of the machine behind its boards, by number."""
     bridge = believed.bridge
+    common = {**_COMMON, **_wired(bridge)}
     if number == NOMINAL:
-        return replace(bridge, _COMMON)
+        return replace(bridge, common)
     rng = np.random.default_rng([_STREAM, number])
     wrong = {
         name: float(1.0 + rng.uniform(-_MODEL_ERROR, _MODEL_ERROR))
@@ -92,7 +101,7 @@ def machine(number: int, believed: Believed = PLAIN) -> BridgeParameters:
     return replace(
         bridge,
         {
-            **_COMMON,
+            **common,
             **{f'emulation.offset.{name}': share for name, share in wrong.items()},
             'emulation.seed': number,
             'emulation.guide.coulomb': coulomb.tolist(),
@@ -103,6 +112,27 @@ def machine(number: int, believed: Believed = PLAIN) -> BridgeParameters:
             'amplifier.offset': offset,
         },
     )
+
+
+def _wired(bridge: BridgeParameters) -> dict[str, object]:
+    """The machine behind the boards, wired as the bridge has it: it has been commissioned."""
+    amplifier, encoder = bridge.amplifier, bridge.encoder
+    wiring = {
+        'phase_board': amplifier.board,
+        'phase_channel': amplifier.channel,
+        'phase_sign': amplifier.sign,
+        'gain': amplifier.gain,
+        'offset': amplifier.offset,
+        'angle': bridge.commutation.offset,
+        'encoder_board': encoder.board,
+        'encoder_channel': encoder.channel,
+        'encoder_direction': encoder.direction,
+    }
+    return {
+        **{f'emulation.wiring.{name}': value for name, value in wiring.items()},
+        'emulation.encoder.gap_resolution': encoder.resolution[0],
+        'emulation.encoder.horizontal_resolution': encoder.resolution[4],
+    }
 
 
 def _coupling(wrong: dict[str, float]) -> float:
