@@ -24,18 +24,16 @@ def equilibrium_current(machine: Machine, gap: float) -> float:
     return (a - math.sqrt(0.25 * machine.M_y * machine.G)) / b
 
 
-@borrowing
-def motor_attraction(machine: Machine, gap: float, i_d: float) -> float:
-    """Attraction of one motor [N] at a gap [m] with i_d [A] and no i_q, by (2)."""
-    a, b, _ = attraction_coefficients(machine, gap)
-    return float((a - b * i_d) ** 2)
-
-
 def stiffness(machine: Machine, gap: float) -> tuple[float, float, float, float, float]:
     """α of y, x, z, phi, theta [1/s²]: what (6), (7) give per deviation, at fixed currents."""
     i_d, step = equilibrium_current(machine, gap), 1e-6
-    slope = motor_attraction(machine, gap + step, i_d) - motor_attraction(machine, gap - step, i_d)
-    slope /= 2.0 * step
+
+    def attraction(gap: float) -> float:
+        """Of one motor [N], without i_q, by (2)."""
+        a, b, _ = attraction_coefficients(machine, gap)
+        return (a - b * i_d) * (a - b * i_d)
+
+    slope = (attraction(gap + step) - attraction(gap - step)) / (2.0 * step)
     tilt = -2.0 * machine.r**2 / machine.I_x * slope
     alpha_y = -4.0 * slope / machine.M_y
     return alpha_y, 0.0, 0.0, tilt - machine.k_s_phi, tilt - machine.k_s_theta

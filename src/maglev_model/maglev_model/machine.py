@@ -156,18 +156,8 @@ def machine_constants(parameters: MachineParameters) -> Machine:
     K_v1 = L_A * p_m * tau / (4.0 * mu_0)
     K_v2 = 3.0 * math.sqrt(2.0) * L_A * p_m * W * k_w1 / p.pole_pairs
     K_v3 = 18.0 * L_A * p_m * W**2 * k_w1**2 * mu_0 / (tau * p.pole_pairs**2)
-    K_h = (
-        12.0
-        * math.sqrt(2.0)
-        * W
-        * k_w1
-        * p_m
-        * L_A
-        * p.magnet_charge
-        * mu_0
-        * magnet_shape
-        / (math.pi * p.pole_pairs)
-    )
+    magnets = 12.0 * math.sqrt(2.0) * W * k_w1 * p_m * L_A * p.magnet_charge * mu_0
+    K_h = magnets * magnet_shape / (math.pi * p.pole_pairs)
     return Machine(
         K_v1=K_v1,
         K_v2=K_v2,

@@ -15,7 +15,7 @@ from numpy.polynomial import Chebyshev
 from maglev_model.axes import AXES, FloatArray, X, Y, Z
 from maglev_model.parameters import ParameterError
 from maglev_model.quintic import minimum_jerk
-from maglev_reference.motion import Kinematics
+from maglev_reference.motion import Kinematics, Stand
 from maglev_reference.trajectory_parameters import (
     ChirpParameters,
     CircleParameters,
@@ -41,7 +41,7 @@ class Sinusoids:
     """Each output follows its offset (5,) and its terms, for any time t."""
 
     def __init__(self, offset: FloatArray, terms: Sequence[Term]) -> None:
-        self._offset = np.array(offset, dtype=float)
+        self._offset = Stand(offset)
         self.terms = tuple(term for term in terms if term.amplitude != 0.0)
 
     @classmethod
@@ -86,7 +86,7 @@ class Sinusoids:
 
     def evaluate(self, time: FloatArray) -> Kinematics:
         """Position, velocity and acceleration at each time (n,) [s]."""
-        samples = _standing(self._offset, len(time))
+        samples = self._offset.evaluate(time)
         for axis, amplitude, frequency, phase in self.terms:
             angle = frequency * time + phase
             sine = amplitude * np.sin(angle)
@@ -105,7 +105,7 @@ class Helix:
     """
 
     def __init__(self, parameters: HelixParameters, home: FloatArray, fundamental: float) -> None:
-        self._home = np.array(home, dtype=float)
+        self._home = Stand(home)
         self._frequency = parameters.frequency or fundamental
         turn = 2.0 * math.pi / self._frequency
         self._half = parameters.turns * turn
@@ -116,7 +116,7 @@ class Helix:
 
     def evaluate(self, time: FloatArray) -> Kinematics:
         """Position, velocity and acceleration at each time (n,) [s]."""
-        samples = _standing(self._home, len(time))
+        samples = self._home.evaluate(time)
         progress, rate, change = self._progress(time)
         (gap_0, gap_1), (radius_0, radius_1) = self._ends
         samples.position[:, Y] = gap_0 + (gap_1 - gap_0) * progress
@@ -161,7 +161,7 @@ class Square:
     """
 
     def __init__(self, parameters: SquareParameters, home: FloatArray) -> None:
-        self._home = np.array(home, dtype=float)
+        self._home = Stand(home)
         self._speed = parameters.speed
         self._side = parameters.side
         self._corner = 15.0 * math.pi / 16.0 * parameters.corner  # its length
@@ -180,7 +180,7 @@ class Square:
 
     def evaluate(self, time: FloatArray) -> Kinematics:
         """Position, velocity and acceleration at each time (n,) [s]."""
-        samples = _standing(self._home, len(time))
+        samples = self._home.evaluate(time)
         way = self._speed * time
         quarter = np.floor(way / self._quarter)
         way = way - quarter * self._quarter
@@ -212,7 +212,7 @@ class Chirp:
     """
 
     def __init__(self, parameters: ChirpParameters, home: FloatArray) -> None:
-        self._home = np.array(home, dtype=float)
+        self._home = Stand(home)
         self.axis = AXES.index(parameters.axis)
         self._amplitude = parameters.amplitude
         self._start, self._end = parameters.frequency
@@ -222,7 +222,7 @@ class Chirp:
 
     def evaluate(self, time: FloatArray) -> Kinematics:
         """Position, velocity and acceleration at each time (n,) [s]."""
-        samples = _standing(self._home, len(time))
+        samples = self._home.evaluate(time)
         swept = np.clip(time, 0.0, self.length)
         after = np.maximum(time - self.length, 0.0)
         frequency = self._start + self._rise * swept
@@ -247,8 +247,3 @@ def _integral(function: Callable[[FloatArray], FloatArray]) -> Chebyshev:
 def _heading(u: FloatArray) -> FloatArray:
     """Direction in a corner [rad] at ``u`` of its length, 0 to 1."""
     return 0.5 * math.pi * minimum_jerk(u)[0]
-
-
-def _standing(position: FloatArray, count: int) -> Kinematics:
-    shape = (count, 5)
-    return Kinematics(np.broadcast_to(position, shape).copy(), np.zeros(shape), np.zeros(shape))

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from maglev_controller.step.arrays import INTERVALS, Record
 from maglev_model.axes import FloatArray
-from maglev_model.compiled import borrowing, compiled
+from maglev_model.compiled import borrowing
 from maglev_model.machine import Machine, machine_constants
 from maglev_model.motor import force_coefficients, inductances
 from maglev_model.platen import gaps_from_outputs, output_accelerations
@@ -72,7 +72,7 @@ def _share(voltage: float, free_d: float, free_q: float, step_d: float, step_q: 
     return min(max((math.sqrt(root) - along) / square, 0.0), 1.0)
 
 
-@compiled
+@borrowing
 def keep_within_voltage(
     settings: Record,
     machine: Machine,
@@ -86,25 +86,12 @@ def keep_within_voltage(
     True when one was; ``realised`` of the sample is then what all currents make. ``asked`` of the
     sample, from which the next step goes, is kept without limits too: they may be set in flight.
     """
-    if settings.winding.limits:
-        return _keep_within(settings, machine, sample, axes, direct, quadrature, np.empty(4))
-    for motor in range(4):
-        sample.asked[motor], sample.asked[4 + motor] = direct[motor], quadrature[motor]
-    return False
-
-
-@borrowing
-def _keep_within(
-    settings: Record,
-    machine: Machine,
-    sample: Record,
-    axes: Record,
-    direct: FloatArray,
-    quadrature: FloatArray,
-    gap: FloatArray,
-) -> bool:
-    """As :func:`keep_within_voltage`, with room for the gaps (4,)."""
+    if not settings.winding.limits:
+        for motor in range(4):
+            sample.asked[motor], sample.asked[4 + motor] = direct[motor], quadrature[motor]
+        return False
     winding, before, shortened = settings.winding, sample.asked, False
+    gap = sample.work[0]  # the inverse is done with it
     gaps_from_outputs(machine, sample.position, gap)
     rate = axes[0].smooth_velocity
     tilt_phi = machine.r * axes[3].smooth_velocity
