@@ -109,10 +109,11 @@ class Regulator:
         elif make is not None:
             self.foreign = ForeignLaw(make(self.parameters), self.parameters)
         if self.foreign is not None:
-            warm_up(self._arrays, self.foreign.gives_currents)
+            warm_up(self.arrays, self.foreign.gives_currents)
 
     def _use(self, arrays: ControlArrays) -> None:
-        self._arrays = arrays
+        self.arrays = arrays
+        """The regulator's own, for compiled loops that call ``control_step``."""
         sample = arrays.sample
         self.position: FloatArray = sample['position']
         self.error: FloatArray = sample['error']
@@ -123,17 +124,12 @@ class Regulator:
     def __getstate__(self) -> tuple[Any, ...]:
         """What goes to another process; the readable arrays are views and made again there."""
         given = self._given, self.foreign
-        return self.parameters, self.designs, self.margins, self._arrays, *given
+        return self.parameters, self.designs, self.margins, self.arrays, *given
 
     def __setstate__(self, state: tuple[Any, ...]) -> None:
         """Come back from another process."""
         self.parameters, self.designs, self.margins, arrays, self._given, self.foreign = state
         self._use(arrays)
-
-    @property
-    def arrays(self) -> ControlArrays:
-        """The regulator's own arrays, for compiled loops that call ``control_step``."""
-        return self._arrays
 
     def describe_loops(self) -> list[str]:
         """Margins and poles of the sampled closed loop, one line for each axis under control."""
@@ -158,7 +154,7 @@ class Regulator:
         two. Raises ``ParameterError`` for what cannot change in flight.
         """
         check_retuning(previous.parameters, self.parameters)
-        carry_over(previous.arrays, self._arrays, maps)
+        carry_over(previous.arrays, self.arrays, maps)
         self.foreign = previous.foreign
         if self.foreign is not None:
             self.foreign.parameters = self.parameters
@@ -168,25 +164,25 @@ class Regulator:
 
         With ``in_flight`` the currents of the last sample are not forgotten: they flow.
         """
-        records = self._arrays.records
+        records = self.arrays.records
         asked = records['sample']['asked'] * in_flight
         records['axes'] = np.zeros((), AXIS)
         records['axes']['fresh'] = True
         records['axes']['friction'] = self.parameters.friction.initial
         records['sample'] = np.zeros((), SAMPLE)
         records['sample']['asked'] = asked
-        self._arrays.xi[:] = 0.0
+        self.arrays.xi[:] = 0.0
         if self.foreign is not None:
             self.foreign.reset()
 
     def save(self) -> tuple[Any, ...]:
         """What is remembered from sample to sample, for :meth:`restore`."""
-        records = self._arrays.records[['axes', 'sample']]
-        return records.copy(), self._arrays.xi.copy(), copy.deepcopy(self.foreign)
+        records = self.arrays.records[['axes', 'sample']]
+        return records.copy(), self.arrays.xi.copy(), copy.deepcopy(self.foreign)
 
     def restore(self, saved: tuple[Any, ...]) -> None:
         """Go back to what was saved."""
-        self._arrays.records[['axes', 'sample']], self._arrays.xi[:], foreign = saved
+        self.arrays.records[['axes', 'sample']], self.arrays.xi[:], foreign = saved
         self.foreign = copy.deepcopy(foreign)
 
     def step(
@@ -216,7 +212,7 @@ class Regulator:
             reference = position, velocity, acceleration
             return self._ask(self.foreign, gap, x, z, reference, direct_out, quadrature_out)
         code = answer_sample(
-            *self._arrays,
+            *self.arrays,
             gap,
             x,
             z,
@@ -242,16 +238,16 @@ class Regulator:
     ) -> int:
         """:meth:`step` with somebody else's law."""
         told = np.empty((TOLD, 5))
-        code = open_sample(*self._arrays, gap, x, z, *reference, told)
+        code = open_sample(*self.arrays, gap, x, z, *reference, told)
         if code >= FIRST_FAULT:
             direct[:] = quadrature[:] = 0.0
             raise MeasurementFault(self.describe(code, gap, x, z))
         answer = law.ask(gap, x, z, told)
         if answer is not None and law.gives_currents:
             direct[:], quadrature[:] = answer
-            return close_with_currents(*self._arrays, direct, quadrature)
+            return close_with_currents(*self.arrays, direct, quadrature)
         wanted = self.virtual_input if answer is None else answer
-        return close_with_input(*self._arrays, wanted, direct, quadrature)
+        return close_with_input(*self.arrays, wanted, direct, quadrature)
 
     def describe(self, code: int, gap: FloatArray, x: float, z: float) -> str:
         """What a fault code of ``control_step`` means for the measurement it came from."""
@@ -269,7 +265,7 @@ class Regulator:
         return f'the measurement is out of range: {values}: {self._out_of_range()}'
 
     def _out_of_range(self) -> str:
-        settings, sample = self._arrays.settings, self._arrays.sample
+        settings, sample = self.arrays.settings, self.arrays.sample
         outputs = zip(AXES, sample['output'], settings['lower'], settings['upper'], strict=True)
         for name, value, low, high in outputs:
             if not low <= value <= high:

@@ -61,7 +61,6 @@ class Supervisor:
         self._row = -1  # of the reference last followed in this flight
         self._may_lift_off = False  # a rest was seen since the enable, and since a flight's middle
         self._segment = -1
-        self._lower_stop = parameters.machine.gap_max
         self._hurried = hurried
         self._hurry()
         self._warm_up()
@@ -72,8 +71,9 @@ class Supervisor:
 
     def _warm_up(self) -> None:
         """Compile, or load what was compiled, before the first sample asks for it."""
-        rest = np.array([self._lower_stop, 0.0, 0.0, 0.0, 0.0]), np.zeros(5), np.zeros(5)
-        self._regulate(np.full(4, self._lower_stop), 0.0, 0.0, rest)
+        stop = self.parameters.machine.gap_max
+        rest = np.array([stop, 0.0, 0.0, 0.0, 0.0]), np.zeros(5), np.zeros(5)
+        self._regulate(np.full(4, stop), 0.0, 0.0, rest)
         Landing(self.parameters, *rest).step()
         self._watch_following(rest)
         self._reach.fault(*rest)
@@ -116,7 +116,6 @@ class Supervisor:
         self.regulator, self.parameters = regulator, regulator.parameters
         self._following_watch.tune(regulator.parameters)
         self._reach = ReferenceReach(regulator.parameters)
-        self._lower_stop = regulator.parameters.machine.gap_max
         self._hurry()
 
     def enable(self) -> tuple[bool, str]:
@@ -228,7 +227,7 @@ class Supervisor:
 
     def _end(self, gap: float) -> None:
         """The reference wants no current any more."""
-        if gap < self._lower_stop - _FLYING_MARGIN:
+        if gap < self.parameters.machine.gap_max - _FLYING_MARGIN:
             self._land('the reference ended in flight')
         else:
             self.mode = Mode.WAITING

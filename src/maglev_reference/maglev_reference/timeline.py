@@ -77,19 +77,14 @@ class Timeline:
             self._adopt(planner.segments)
 
     @property
-    def segments(self) -> tuple[Segment, ...]:
-        """The segments in order; the last one has no end."""
-        return tuple(self._segments)
-
-    @property
     def end(self) -> int | None:
         """The sample at which END begins; None while resting without a start."""
-        last = self._segments[-1]
+        last = self.segments[-1]
         return last.first if last.phase == Phase.END else None
 
     def phase(self, sample: int) -> Phase:
         """The phase at a sample."""
-        return self._segments[self._index(sample)].phase
+        return self.segments[self._index(sample)].phase
 
     def block(self, first: int, count: int) -> Block:
         """Samples ``first`` to ``first + count - 1``. Raises ValueError for a negative sample.
@@ -104,7 +99,7 @@ class Timeline:
 
     def settled(self, sample: int) -> bool:
         """Whether it rests from ``sample`` on, until it is told to lift off."""
-        segment = self._segments[self._index(sample)]
+        segment = self.segments[self._index(sample)]
         return segment.samples is None and segment.phase in _GROUND
 
     def hover(self, sample: int) -> FloatArray | None:
@@ -119,7 +114,7 @@ class Timeline:
 
         Until it is told to land. What is followed has been checked.
         """
-        segment = self._segments[self._index(first)]
+        segment = self.segments[self._index(first)]
         planner = Planner(self._parameters, first, segment.number + 1, self._state_before(first))
         planner.follow(motion, samples)
         self._replace(first, planner.segments)
@@ -130,12 +125,12 @@ class Timeline:
         Returns False when it has started already. Raises UnreachableError where the platen cannot
         lift off from there; it then goes on resting.
         """
-        segment = self._segments[self._index(first)]
+        segment = self.segments[self._index(first)]
         if not self.settled(first):
             return False
         start = State.at_rest(self._rest_position(rest))
         planner = self._full_plan(start, first, segment.number + 1)
-        before = self._segments
+        before = self.segments
         self._replace(first, planner.segments)
         try:
             self._check_way_up(first)
@@ -152,7 +147,7 @@ class Timeline:
         """
         if self.settled(first):
             return False
-        segment = self._segments[self._index(max(first - 1, 0))]
+        segment = self.segments[self._index(max(first - 1, 0))]
         planner = Planner(self._parameters, first, segment.number + 1, self._at_rest)
         if segment.phase == Phase.REST:
             planner.rest()
@@ -166,7 +161,7 @@ class Timeline:
 
         Returns False when it has already landed or is about to.
         """
-        segment = self._segments[self._index(first)]
+        segment = self.segments[self._index(first)]
         if segment.phase in (Phase.LAND, Phase.END):
             return False
         planner = Planner(self._parameters, first, segment.number + 1, self._state_before(first))
@@ -200,19 +195,20 @@ class Timeline:
 
     def _state_before(self, sample: int) -> State:
         """The state a new segment takes over at ``sample``: of what was there, without its jump."""
-        segment = self._segments[self._index(sample)]
+        segment = self.segments[self._index(sample)]
         if segment.jumps and segment.first == sample:
-            segment = self._segments[self._index(sample - 1)]
+            segment = self.segments[self._index(sample - 1)]
         time = (sample - segment.first) * self._parameters.sample_time
         return state_at(segment.motion, time)
 
     def _adopt(self, segments: list[Segment]) -> None:
-        self._segments = list(segments)
-        self._firsts = [segment.first for segment in self._segments]
+        self.segments = list(segments)
+        """In order; the last one has no end."""
+        self._firsts = [segment.first for segment in self.segments]
         self._cached_chunk = -1
 
     def _replace(self, first: int, segments: list[Segment]) -> None:
-        kept = [segment for segment in self._segments if segment.first < first]
+        kept = [segment for segment in self.segments if segment.first < first]
         if kept:
             kept[-1] = kept[-1]._replace(samples=first - kept[-1].first)
         self._adopt(kept + segments)
@@ -228,7 +224,7 @@ class Timeline:
 
     def _evaluate(self, first: int, count: int) -> Block:
         pieces, stop = [], first + count
-        for segment in self._segments[self._index(first) : self._index(stop - 1) + 1]:
+        for segment in self.segments[self._index(first) : self._index(stop - 1) + 1]:
             begin, end = max(first, segment.first), min(stop, segment.last + 1)
             time = np.arange(begin - segment.first, end - segment.first, dtype=np.float64)
             moved = segment.motion.evaluate(self._parameters.sample_time * time)
@@ -240,8 +236,8 @@ class Timeline:
 
     def _check(self) -> None:
         """What is measured first, so that it and not the way to it is found at fault."""
-        end = self._segments[-1].first
-        for segment in sorted(self._segments, key=lambda segment: segment.phase not in _MEASURED):
+        end = self.segments[-1].first
+        for segment in sorted(self.segments, key=lambda segment: segment.phase not in _MEASURED):
             last = min(segment.last, end)
             if isinstance(segment.motion, Stand):  # a sample is as the one before
                 last = min(last, segment.first + 1)
@@ -250,13 +246,13 @@ class Timeline:
     def _check_way_up(self, first: int) -> None:
         """From sample ``first`` to what is measured; that has been checked, and what follows."""
         stop = next(
-            each.first for each in self._segments if each.first > first and each.phase in _MEASURED
+            each.first for each in self.segments if each.first > first and each.phase in _MEASURED
         )
         self._check_range(first, stop)
 
     def _check_range(self, first: int, stop: int) -> None:
         sample_time = self._parameters.sample_time
-        jumps_at = [segment.first for segment in self._segments if segment.jumps]
+        jumps_at = [segment.first for segment in self.segments if segment.jumps]
         for start in range(first, stop, _CHECKED_TOGETHER):
             count = min(_CHECKED_TOGETHER + 1, stop - start)  # one more, to see the seam
             block = self._evaluate(start, count)

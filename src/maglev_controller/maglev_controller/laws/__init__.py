@@ -61,16 +61,12 @@ def find_law(name: str) -> ControlLaw:
     function = functools.partial(plugin_function, 'law', name, package=__name__)
     references = getattr(module, 'REFERENCES', ())
     if callable(getattr(module, 'make', None)):
-        check = function('check') if hasattr(module, 'check') else _check_nothing
+        check = function('check') if hasattr(module, 'check') else lambda _: None
         lands = find_law(_LANDS).design
         return ControlLaw(check, lands, False, references, function('make'))
     check, design = function('check'), function('design', gives=AxisDesign)
     has_crossover = getattr(module, 'HAS_CROSSOVER', False)
     return ControlLaw(check, design, has_crossover, references)
-
-
-def _check_nothing(_: ControllerParameters) -> None:
-    pass
 
 
 def control_law(parameters: ControllerParameters) -> ControlLaw:

@@ -8,7 +8,6 @@ match it.
 from __future__ import annotations
 
 from maglev_controller.checks import check_inverse
-from maglev_controller.design.axis_design import AxisDesign
 from maglev_controller.laws import output_regulator
 from maglev_controller.parameters import ControllerParameters
 from maglev_model.parameters import ParameterError
@@ -27,6 +26,5 @@ def check(parameters: ControllerParameters) -> None:
             )
 
 
-def design(parameters: ControllerParameters, axis: str) -> AxisDesign:
-    """As :mod:`~maglev_controller.laws.output_regulator`; the tilts' gains are not used."""
-    return output_regulator.design(parameters, axis)
+design = output_regulator.design
+"""The tilts' gains are not used."""

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from maglev_model.axes import FloatArray
 
 
 class EncoderSample(NamedTuple):
