@@ -95,6 +95,9 @@ class MadeUpNode:
     def get_namespace(self) -> str:
         return '/'
 
+    def resolve_topic_name(self, topic: str) -> str:
+        return f'/{topic}'
+
     def get_subscriptions_info_by_topic(self, topic: str) -> list[Any]:
         names = self.subscribers.get(topic, [])
         return [SimpleNamespace(node_name=name, node_namespace='/') for name in names]

@@ -102,7 +102,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         self._currents['session'] = self._session
         self._state = SampleWriter(self, CONTROLLER_STATE, qos)
         self._progress = ProgressWriter(self, CONTROLLER_PROGRESS, self._state)
-        self._watchers = Watchers(self, self.parameters.watchers)
+        self._watchers = Watchers(self, self.parameters.watchers, CURRENTS, CONTROLLER_STATE)
         self._references = SampleQueue(self, REFERENCE, reference_qos())
         self._measurements = hear(self, MEASUREMENT, self._on_measurement)
         self._by_hand = (
@@ -145,7 +145,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         sequence = message.sequence
         if self._runs_otherwise(message) or self._anothers(message):
             return
-        if self._sequence < 0 and not self._watchers.there(CURRENTS, CONTROLLER_STATE):
+        if self._sequence < 0 and not self._watchers.there():
             return
         if sequence == self._sequence:  # repeated: the answer was not heard
             self._currents.publish()

@@ -120,33 +120,38 @@ class GraphGuard:
 
 
 class Watchers:
-    """Nodes, by name and in the namespace of ``node``, that shall see all that it publishes.
+    """Nodes, by name and in the namespace of ``node``, that shall see all it publishes on topics.
 
     Whoever else subscribes counts for nothing.
     """
 
-    def __init__(self, node: Node, names: Iterable[str]) -> None:
-        self._node, self._names = node, tuple(names)
+    def __init__(self, node: Node, names: Iterable[str], *topics: str) -> None:
+        self._node, self._names, self._topics = node, tuple(names), topics
         self._since: dict[tuple[str, str], float] = {}  # that a name subscribes to a topic [s]
         self._reminded = time.monotonic()
 
-    def missing(self, *topics: str) -> list[str]:
+    def missing(self) -> list[str]:
         """Those that do not yet get what is published on all of these topics."""
         ready = set(self._names)
         if self._names:
-            for topic in topics:
+            for topic in self._topics:
                 ready &= self._ready(topic)
         return [name for name in self._names if name not in ready]
 
-    def there(self, *topics: str) -> bool:
+    def awaited(self) -> str:
+        """Who is waited for, in a line, or ''."""
+        if not (missing := self.missing()):
+            return ''
+        where = ' and '.join(map(self._node.resolve_topic_name, self._topics))
+        return f'waiting for {", ".join(missing)} to subscribe to {where}'
+
+    def there(self) -> bool:
         """Whether none is missing; now and then says who is."""
-        missing = self.missing(*topics)
-        if missing and time.monotonic() - self._reminded > _REMINDER:
+        awaited = self.awaited()
+        if awaited and time.monotonic() - self._reminded > _REMINDER:
             self._reminded = time.monotonic()
-            names = ', '.join(missing)
-            where = ' and '.join(self._node.resolve_topic_name(topic) for topic in topics)
-            self._node.get_logger().info(f'waiting for {names} to subscribe to {where}')
-        return not missing
+            self._node.get_logger().info(awaited)
+        return not awaited
 
     def _ready(self, topic: str) -> set[str]:
         here, now = self._node.get_namespace(), time.monotonic()

@@ -27,7 +27,8 @@ class SamplePublisher:
 
     Stamps are stage time: the wall clock at the first sample since :meth:`start`, plus
     ``sample_time`` [s] for each further one. It never goes back, also where it was ahead of the
-    wall clock, as in lockstep. There ``clock`` tells it to the graph.
+    wall clock, as in lockstep. There ``clock`` tells it to the graph. ``watchers`` are those who
+    shall see every sample.
     """
 
     def __init__(self, node: MaglevNode[P], sample_time: float, *, truth: bool) -> None:
@@ -40,12 +41,9 @@ class SamplePublisher:
         self._measurement = SampleWriter(node, MEASUREMENT, qos)
         self._measurement['lockstep'] = lockstep
         self._progress = ProgressWriter(node, STAGE_PROGRESS, self._measurement)
-        self._topics = [MEASUREMENT]
-        self._watchers = Watchers(node, node.parameters.watchers)
-        self._true_state: SampleWriter | None = None
-        if truth:
-            self._topics.append(TRUE_STATE)
-            self._true_state = SampleWriter(node, TRUE_STATE, qos)
+        topics = (MEASUREMENT, TRUE_STATE) if truth else (MEASUREMENT,)
+        self.watchers = Watchers(node, node.parameters.watchers, *topics)
+        self._true_state = SampleWriter(node, TRUE_STATE, qos) if truth else None
         self._clock = Clock()
         self._clock_publisher: Any = None
         if lockstep:
@@ -86,14 +84,6 @@ class SamplePublisher:
         if self._first is None:
             return 0
         return self._first[1] + (sequence - self._first[0]) * self._period
-
-    def watched(self) -> bool:
-        """Whether all who shall see every sample are there; now and then says who is not."""
-        return self._watchers.there(*self._topics)
-
-    def missing(self) -> list[str]:
-        """Names of those who shall see every sample and are not there."""
-        return self._watchers.missing(*self._topics)
 
     def destroy(self) -> None:
         """Leave the graph."""

@@ -104,7 +104,7 @@ class Sampling(Generic[P, S]):
 
     def awaited(self) -> str:
         """Who is waited for before the first sample is answered."""
-        return ', '.join(self._publisher.missing()) or 'a controller'
+        return ', '.join(self._publisher.watchers.missing()) or 'a controller'
 
     def emergency_stop(self) -> str:
         """Latch a fault; returns what comes of it."""
@@ -133,7 +133,7 @@ class Sampling(Generic[P, S]):
     # -- lockstep ----------------------------------------------------------------------------------
 
     def _on_answer(self, message: Any) -> None:
-        if self._timer is None or not (self.answered or self._publisher.watched()):
+        if self._timer is None or not (self.answered or self._publisher.watchers.there()):
             return
         verdict = self._judge(message)
         if message.sequence == self.sequence and verdict is not Verdict.ELSEWHERE:
@@ -152,7 +152,7 @@ class Sampling(Generic[P, S]):
             return
         waited = time.monotonic() - self._sample_time
         if not self.answered:
-            self._publisher.watched()  # they match while nobody answers yet
+            self._publisher.watchers.there()  # they match while nobody answers yet
             self._publish()
         elif waited > self._node.parameters.answer_timeout:
             who = (

@@ -108,7 +108,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         self._graph.claim(REFERENCE, 'reference')
         lead = self.parameters.lead + PROGRESS_PERIOD - 1  # of the newest that may be heard of
         self._run = ReferenceRun(self.parameters, lead, self.parameters.autostart)
-        self._watchers = Watchers(self, self.parameters.watchers)
+        self._watchers = Watchers(self, self.parameters.watchers, REFERENCE)
         self._seen = self._reminded = self._looked = time.monotonic()
         self._message = SampleWriter(self, REFERENCE, reference_qos(KEPT[self.parameters.mode]))
         self._message['session'] = secrets.randbits(64) | 1
@@ -161,7 +161,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         answered = self._lockstep or self._run.controller is not None
         if news and self._flown:
             self._leave_if_another()
-        if news and answered and not self._flown and not self._watchers.missing(REFERENCE):
+        if news and answered and not self._flown and not self._watchers.missing():
             self._start()
         else:
             self._remind()
@@ -183,10 +183,8 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
             self.get_logger().info(self._waiting_for())
 
     def _waiting_for(self) -> str:
-        missing = self._watchers.missing(REFERENCE)
-        if missing:
-            where = self._message.publisher.topic_name
-            return f'waiting for {", ".join(missing)} to subscribe to {where}'
+        if awaited := self._watchers.awaited():
+            return awaited
         if self._measurements.raw.publisher_count() == 0:
             return f'waiting for a stage on {self._measurements.raw.topic}'
         if self._flown:
