@@ -42,9 +42,10 @@ class Block(NamedTuple):
 
     @classmethod
     def joined(cls, blocks: Iterable[Block], rows: slice = slice(None)) -> Block:
-        """Some of the samples, ``rows``, of blocks one after another."""
+        """Some of the samples, ``rows``, of blocks one after another; of a single one no copy."""
         columns: Any = zip(*blocks, strict=True)
-        return cls(*(np.concatenate(column)[rows] for column in columns))
+        whole = (each[0] if len(each) == 1 else np.concatenate(each) for each in columns)
+        return cls(*(each[rows] for each in whole))
 
 
 class Timeline:
