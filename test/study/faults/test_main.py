@@ -166,3 +166,28 @@ def test_ctrl_c_ends_in_order_with_what_was_done(tmp_path: Path) -> None:
     assert process.returncode == INTERRUPTED
     assert time.monotonic() - started < 30.0
     assert ' of 5000 runs' in (tmp_path / 'faults.html').read_text(encoding='utf-8')
+
+
+def test_what_was_flown_before_a_kill_is_kept_and_the_same_call_goes_on(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    call = [sys.executable, '-m', 'maglev_study.faults.main', '--runs=4', '--jobs=1', '--seed=58']
+    process = subprocess.Popen([*call, '--out', str(tmp_path)], start_new_session=True)
+    journal = tmp_path / 'flown.jsonl'
+    while process.poll() is None and (not journal.is_file() or journal.read_text().count('\n') < 2):
+        time.sleep(0.01)  # the first machine has two runs left
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    kept = journal.read_text(encoding='utf-8')
+    again = ['--runs=4', '--jobs=1', '--seed=58', '--json', '--out']
+    codes, outcomes = [], []
+    for folder in (tmp_path, tmp_path / 'whole'):
+        codes.append(run([*again, str(folder)]))
+        outcomes.append({**json.loads(capsys.readouterr().out), 'out': '', 'page': ''})
+    assert codes[0] == codes[1]
+    assert outcomes[0] == outcomes[1]
+    assert outcomes[0]['runs'] == 4
+    assert journal.read_text(encoding='utf-8').startswith(kept)
+    assert journal.read_text() == (tmp_path / 'whole' / 'flown.jsonl').read_text()
+    assert run([*again, str(tmp_path), '--double']) == WRONG_USE
+    assert 'whose double is False' in capsys.readouterr().err

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import multiprocessing
 import signal
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from itertools import groupby
 from multiprocessing.synchronize import Event
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from maglev_model.programs.command import noted
+from maglev_study.faults.draw import scenario
 from maglev_study.faults.fly import Scenario
 from maglev_study.faults.judge import Verdict
 from maglev_study.faults.machines import PLAIN, Believed
@@ -29,6 +30,17 @@ class Outcome(NamedTuple):
 
     run: Scenario
     verdict: Verdict
+
+    def to_json(self) -> dict[str, Any]:
+        """The run's seed and the verdict, as plain values."""
+        return {'seed': self.run.seed, **self.verdict._asdict()}
+
+    @classmethod
+    def from_json(cls, plain: Mapping[str, Any], *, double: bool) -> Outcome:
+        """What :meth:`to_json` wrote, of runs with ``double`` faults or not."""
+        verdict = {name: plain[name] for name in Verdict._fields}
+        verdict['violations'] = tuple((rule, text) for rule, text in plain['violations'])
+        return cls(scenario(plain['seed'], double=double), Verdict(**verdict))
 
 
 class Campaign:

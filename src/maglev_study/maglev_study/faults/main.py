@@ -7,6 +7,7 @@ from what is believed of them, and judges each run by what truly happened.
 from __future__ import annotations
 
 import argparse
+import functools
 import json
 import os
 import sys
@@ -15,7 +16,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-from maglev_model.parameters import ParameterError
+from maglev_model.compiled.sources import sources_digest
+from maglev_model.parameters import ParameterError, differing
 from maglev_model.programs.arguments import whole_number
 from maglev_model.programs.command import leave_with
 from maglev_model.programs.progress import Progress, add_output_options
@@ -27,6 +29,7 @@ from maglev_study.faults.judge import RULES
 from maglev_study.faults.machines import Believed, believed
 from maglev_study.faults.page import describe, describe_violations, write
 from maglev_study.faults.tally import Tally
+from maglev_study.journal import Journal
 
 PASS, BROKEN = 0, 1
 
@@ -44,32 +47,40 @@ def run(arguments: Sequence[str] | None = None) -> int:
     """Run the command and return its exit code.
 
     0: all rules hold; 1: some do not; 2: wrong use; 130: interrupted, the page tells what was done.
+    What is flown is kept as it comes: the same call with its ``--out`` goes on, also after a kill.
     """
     return command('faults', _parser().parse_args(arguments), _flown)
 
 
 def _flown(options: argparse.Namespace) -> tuple[int, dict[str, Any]]:
-    out, given = writable(options.out), believed(*options.overlay)
+    options.out, given = writable(options.out), believed(*options.overlay)
     if options.replay is not None:
-        return _replay(_run_of(options.replay, options.double), given, out)
+        return _replay(_run_of(options.replay, options.double), given, options.out)
     number = len(cells()) if options.short else options.runs
     runs = [
         scenario(seed, double=options.double) for seed in range(options.seed, options.seed + number)
     ]
-    return _fly(runs, given, options, out)
+    with _journal(options, given) as journal:
+        return _fly(runs, given, options, journal)
 
 
 def _fly(
-    runs: Sequence[Scenario], given: Believed, options: argparse.Namespace, out: Path
+    runs: Sequence[Scenario],
+    given: Believed,
+    options: argparse.Namespace,
+    journal: Journal[Outcome],
 ) -> tuple[int, dict[str, Any]]:
     started = time.monotonic()
-    outcomes: list[Outcome] = []
+    flown = {one.run.seed: one for one in journal.flown}
+    outcomes = [flown[run.seed] for run in runs if run.seed in flown]
+    missing = [run for run in runs if run.seed not in flown]
     shrunk: list[tuple[Outcome, Outcome]] = []
 
     progress = Progress('faults', 'runs')
-    progress.tell(0, len(runs))
+    progress.tell(len(outcomes), len(runs))
 
     def heard(new: list[Outcome]) -> None:
+        journal.add(new)
         outcomes.extend(new)
         broken = sum(bool(one.verdict.violations) for one in outcomes)
         progress.tell(len(outcomes), len(runs), f', {broken} with a rule broken')
@@ -79,10 +90,10 @@ def _fly(
         words = [f'{len(outcomes)} of {len(runs)} runs', f'{spent:.0f} s']
         words += [f'{options.jobs} processes', f'seeds {runs[0].seed} to {runs[-1].seed}']
         words += [f'params {path.name}' for path in options.overlay]
-        return write(out, tally, shrunk, words, len(outcomes) == len(runs))
+        return write(options.out, tally, shrunk, words, len(outcomes) == len(runs))
 
     with Campaign(options.jobs, given) as campaign:
-        campaign.fly(runs, heard)
+        campaign.fly(missing, heard)
         progress.end()
         tally = Tally(sorted(outcomes, key=lambda one: one.run.seed))
         path = report()
@@ -100,7 +111,7 @@ def _fly(
         'page': str(path),
     }
     if campaign.interrupted:
-        print('faults: interrupted', file=sys.stderr)
+        print('faults: interrupted; the same call with this --out goes on', file=sys.stderr)
         return INTERRUPTED, outcome
     return BROKEN if tally.failures else PASS, outcome
 
@@ -154,6 +165,18 @@ def _run_of(text: str, double: bool) -> Scenario:
         ) from error
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise ParameterError(f"--replay: '{text}' holds no run: {error!r}") from error
+
+
+def _journal(options: argparse.Namespace, given: Believed) -> Journal[Outcome]:
+    """What was flown into a folder; its seeds tell the runs. Raises ParameterError, OSError."""
+    params = [{name: value for name, (value, _) in differing(table).items()} for table in given]
+    head = {
+        'code': sources_digest(),
+        'double': options.double,
+        'params': json.dumps(params),
+    }
+    read = functools.partial(Outcome.from_json, double=options.double)
+    return Journal(options.out / 'flown.jsonl', head, Outcome.to_json, read)
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -14,10 +14,10 @@ from typing import Any
 from maglev_model.compiled.sources import sources_digest
 from maglev_model.parameters import ParameterError, values
 from maglev_study.comparison.contestants import Contestant, find_contestants
+from maglev_study.journal import Journal
 from maglev_study.robustness.draw import NOMINAL, Draw, Machine, check_draws, machine, read_draws
 from maglev_study.robustness.experiments import Experiment, chosen, experiments
 from maglev_study.robustness.fly import Flown, fly
-from maglev_study.robustness.journal import Journal
 from maglev_study.workers import results
 
 JOURNAL = 'flown.jsonl'
@@ -143,8 +143,8 @@ def fly_plan(
     head, interrupted = plan.head(), False
     flying = [one for one in plan.contestants if plan.experiments(one)]
     wanted = [(n, one) for n in range(NOMINAL, plan.machines + 1) for one in flying]
-    with Journal(out / JOURNAL, head) as journal:
-        done = journal.done
+    with Journal(out / JOURNAL, head, Flown.to_json, Flown.from_json) as journal:
+        done = {(one.machine, one.law) for one in journal.flown}
         missing = [(n, one) for n, one in wanted if (n, one.name) not in done]
         count = len(wanted) - len(missing)
         try:

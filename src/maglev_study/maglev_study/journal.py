@@ -4,31 +4,39 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from maglev_model.parameters import ParameterError
-from maglev_study.robustness.fly import Flown
 
 FORMAT = 1
 
+T = TypeVar('T')
 
-class Journal:
-    """Lines that are only ever appended: what is flown first, then each machine under each law.
+
+class Journal(Generic[T]):
+    """Lines that are only ever appended: what is flown first, then what came of each part of it.
 
     A line that a crash cut short is as if it had never been. To be used in a ``with`` statement.
     """
 
-    def __init__(self, path: Path, head: Mapping[str, Any]) -> None:
+    def __init__(
+        self,
+        path: Path,
+        head: Mapping[str, Any],
+        to_json: Callable[[T], object],
+        from_json: Callable[[Any], T],
+    ) -> None:
         """Begin a file, or go on with one.
 
-        ``head`` tells campaigns apart. Raises :class:`ParameterError` where the file that is there
+        ``head`` tells campaigns apart; the two functions make plain values of what is flown, and it
+        of them. Raises :class:`ParameterError` where the file that is there
         is another's, or none of a campaign, and OSError where it cannot be written.
         """
-        self.path = path
+        self.path, self._to_json = path, to_json
         head = {'format': FORMAT, **head}
-        self.flown: list[Flown] = []
+        self.flown: list[T] = []
         kept = 0
         if path.is_file():
             for number, line in enumerate(_whole_lines(path)):
@@ -36,27 +44,22 @@ class Journal:
                 if number == 0:
                     self._compare(plain, head)
                 else:
-                    self.flown += [Flown.from_json(one) for one in plain]
+                    self.flown += [from_json(one) for one in plain]
                 kept += len(line)
         self._file = path.open('ab')
         self._file.truncate(kept)
         if not kept:
             self._append(head)
 
-    def __enter__(self) -> Journal:
+    def __enter__(self) -> Journal[T]:
         return self
 
     def __exit__(self, *_: object) -> None:
         self._file.close()
 
-    @property
-    def done(self) -> set[tuple[int, str]]:
-        """Machine and law of what has been flown."""
-        return {(one.machine, one.law) for one in self.flown}
-
-    def add(self, flown: Sequence[Flown]) -> None:
-        """Append what came of one machine under one law, at once and for good."""
-        self._append([one.to_json() for one in flown])
+    def add(self, flown: Sequence[T]) -> None:
+        """Append what came of a part, at once and for good."""
+        self._append([self._to_json(one) for one in flown])
         self.flown += flown
 
     def _append(self, content: object) -> None:
