@@ -168,6 +168,14 @@ def test_ctrl_c_ends_in_order_with_what_was_done(tmp_path: Path) -> None:
     assert ' of 5000 runs' in (tmp_path / 'faults.html').read_text(encoding='utf-8')
 
 
+def group_lives(group: int) -> bool:
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
 def test_what_was_flown_before_a_kill_is_kept_and_the_same_call_goes_on(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -176,8 +184,12 @@ def test_what_was_flown_before_a_kill_is_kept_and_the_same_call_goes_on(
     journal = tmp_path / 'flown.jsonl'
     while process.poll() is None and (not journal.is_file() or journal.read_text().count('\n') < 2):
         time.sleep(0.01)  # the first machine has two runs left
-    os.killpg(process.pid, signal.SIGKILL)
+    process.kill()
     process.wait()
+    deadline = time.monotonic() + 20.0
+    while group_lives(process.pid):
+        assert time.monotonic() < deadline, 'what it has started flies on'
+        time.sleep(0.05)
     kept = journal.read_text(encoding='utf-8')
     again = ['--runs=4', '--jobs=1', '--seed=58', '--json', '--out']
     codes, outcomes = [], []

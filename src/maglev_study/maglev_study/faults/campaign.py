@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import multiprocessing
 import signal
 from collections.abc import Callable, Mapping, Sequence
@@ -19,6 +20,7 @@ from maglev_study.faults.shrink import shrink
 from maglev_study.faults.train import fly_all, warm_up
 
 _LOOK = 0.2  # from a look at the signals to the next [s]
+_PR_SET_PDEATHSIG = 1  # of prctl(2)
 
 _stop: Event | None = None
 
@@ -99,10 +101,11 @@ class Campaign:
 
 
 def _begin(stop: Event) -> None:
-    """A worker leaves Ctrl-C to whoever started it."""
+    """A worker leaves Ctrl-C to whoever started it, and does not outlive it."""
     global _stop
     _stop = stop
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
 def _stopped() -> bool:
