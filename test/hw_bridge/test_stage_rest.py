@@ -41,15 +41,15 @@ def test_where_it_has_not_moved_for_a_tenth_of_a_second_near_its_stop_it_rests(
 ) -> None:
     stage, _ = active()
     watched(stage, LOWER_STOP - above)
-    stage._still_at = LOWER_STOP - above + 0.9e-5
+    stage._still_at = LOWER_STOP - above + 1.9e-5
     for sample in range(1, 101):
         stage._look_for_rest()
         assert stage._still_samples == (sample if near else 0)
         assert stage._on_the_stop() == (near and sample >= 100)
 
 
-@pytest.mark.parametrize(('step', 'moved'), [(0.99e-5, False), (1.01e-5, True)])
-def test_what_moves_by_more_than_ten_um_does_not_stand_still(step: float, *, moved: bool) -> None:
+@pytest.mark.parametrize(('step', 'moved'), [(1.99e-5, False), (2.01e-5, True)])
+def test_what_moves_by_two_counts_does_not_stand_still(step: float, *, moved: bool) -> None:
     stage, _ = active()
     watched(stage, LOWER_STOP - 1e-4)
     stage._look_for_rest()
@@ -227,7 +227,7 @@ def test_exactly_at_a_bound_it_neither_rests_nor_has_it_left() -> None:
     at(stage, np.nextafter(2e-4, 0.0))
     stage._look_for_rest()
     assert stage._still_samples == 1
-    stage._still_at = 1e-5
+    stage._still_at = 2e-5
     stage._look_for_rest()
     assert stage._still_samples == 0
     at(stage, 3e-4)

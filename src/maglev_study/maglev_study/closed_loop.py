@@ -232,17 +232,23 @@ def at_stops(plant: PlantParameters) -> Callable[[FloatArray], NDArray[np.bool_]
 
     Of the axes that are not locked.
     """
-    machine, radius, free = plant.machine, plant.stop.seat_radius, ~np.array(plant.guide.locked)
-    lower = np.array(machine.lower_limit) + _AT_STOP
-    upper = np.array(machine.upper_limit) - _AT_STOP
+    lower = np.array(plant.machine.lower_limit) + _AT_STOP
+    upper = np.array(plant.machine.upper_limit) - _AT_STOP
+    free = ~np.array(plant.guide.locked)
+    return functools.partial(_meets, lower, upper, free, plant.stop.seat_radius)
 
-    def met(output: FloatArray) -> NDArray[np.bool_]:
-        gap, reach = output[..., Y], radius * np.abs(output[..., PHI:]).max(axis=-1)
-        seated = (gap - reach <= lower[Y]) | (gap + reach >= upper[Y])
-        beyond = free & ((output <= lower) | (output >= upper))
-        return np.asarray(seated | beyond.any(axis=-1))
 
-    return met
+def _meets(
+    lower: FloatArray,
+    upper: FloatArray,
+    free: NDArray[np.bool_],
+    radius: float,
+    output: FloatArray,
+) -> NDArray[np.bool_]:
+    gap, reach = output[..., Y], radius * np.abs(output[..., PHI:]).max(axis=-1)
+    seated = (gap - reach <= lower[Y]) | (gap + reach >= upper[Y])
+    beyond = free & ((output <= lower) | (output >= upper))
+    return np.asarray(seated | beyond.any(axis=-1))
 
 
 def warm_up() -> None:

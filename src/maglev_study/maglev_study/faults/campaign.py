@@ -69,7 +69,7 @@ class Campaign:
     def fly(self, runs: Sequence[Scenario], heard: Callable[[list[Outcome]], None]) -> None:
         """Fly runs, handing over outcomes as they come.
 
-        Raises RuntimeError when a machine does not fly even without a fault.
+        Raises ParameterError when a machine does not fly even without a fault.
         """
         by_machine = [list(group) for _, group in groupby(runs, key=lambda run: run.machine)]
         flown = [self._pool.submit(_fly, part, self._believed) for part in by_machine]

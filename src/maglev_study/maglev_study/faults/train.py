@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TypeVar
 
+from maglev_model.parameters import ParameterError
 from maglev_study.faults.flight import Flight
 from maglev_study.faults.fly import Scenario, fly
 from maglev_study.faults.judge import Verdict
@@ -95,7 +96,10 @@ def _false_alarm(flight: Flight) -> str:
 def _demand(well: bool, flight: Flight) -> None:
     if not well:
         bridge = flight.bridge
-        raise RuntimeError(f'sound, but sample {flight.samples}: {bridge.refused or bridge.stray}')
+        raise ParameterError(
+            f'the machine does not fly even without a fault, at sample {flight.samples}:'
+            f' {bridge.refused or bridge.stray}'
+        )
 
 
 def _branch(work: Callable[[], T]) -> T | Verdict:
