@@ -25,6 +25,7 @@ from maglev_controller.design.observer import NO_OBSERVER
 from maglev_controller.foreign_law import ForeignLaw, Law
 from maglev_controller.laws import control_law, find_law
 from maglev_controller.parameters import ControllerParameters
+from maglev_controller.stage_parameters import EncoderParameters, FrictionParameters
 from maglev_controller.step.arrays import (
     AXIS,
     INVERSES,
@@ -347,18 +348,23 @@ def _settings(
         'rest_fades': any(design.fades for design in designs),
         'doubt': DOUBT if any(design.fades for design in designs) else 0.0,
         'waking': -math.expm1(-parameters.sample_time / REST_FADING_TIME),
-        **_counts_and_friction(parameters),
+        **_counts(parameters.encoder),
+        **_friction(parameters.friction, parameters.sample_time),
     }
 
 
-def _counts_and_friction(parameters: ControllerParameters) -> dict[str, ArrayLike]:
-    encoder, friction = parameters.encoder, parameters.friction
-    time = friction.adaptation_time
+def _counts(encoder: EncoderParameters) -> dict[str, ArrayLike]:
     return {
         'half_gap': 0.5 * encoder.gap_resolution,
         'half_horizontal': 0.5 * encoder.horizontal_resolution,
         'floored': encoder.rounding == 'floor',
-        'friction_gain': -math.expm1(-parameters.sample_time / time) if time > 0.0 else 0.0,
+    }
+
+
+def _friction(friction: FrictionParameters, sample_time: float) -> dict[str, ArrayLike]:
+    time = friction.adaptation_time
+    return {
+        'friction_gain': -math.expm1(-sample_time / time) if time > 0.0 else 0.0,
         'friction_way': friction.way,
         'friction_limit': friction.largest,
     }

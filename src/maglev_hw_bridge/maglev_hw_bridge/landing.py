@@ -248,11 +248,10 @@ def impact_of_cut(
 
 def _fastest(parameters: BridgeParameters) -> float:
     """Speed that no free fall between the stops reaches [m/s]: nowhere is the pull harder."""
-    machine, room = parameters.machine, parameters.machine.gap_max - parameters.machine.gap_min
-    zero = np.zeros(4)
-    pull = output_accelerations(machine_constants(machine), machine.gap_min, 0.0, 0.0, zero, zero)[
-        0
-    ]
+    machine, zero = parameters.machine, np.zeros(4)
+    constants = machine_constants(machine)
+    pull, *_ = output_accelerations(constants, machine.gap_min, 0.0, 0.0, zero, zero)
+    room = machine.gap_max - machine.gap_min
     return math.sqrt(2.0 * room * max(abs(pull), machine.gravity))
 
 

@@ -64,10 +64,10 @@ def test_nobody_is_missed_without_a_reason(why: str) -> None:
 
 
 def test_a_bound_that_is_just_reached_is_not_yet_passed() -> None:
-    """35 um: of a step that is a leap, and of the way that calls the roll."""
+    """35 um in a millisecond: a step that is a leap; and of the way that calls the roll."""
     watched = hovering()
     watched.answered[:] = 0
-    watched.past[0, 0], watched.believed[0], watched.left[0] = 0.0, 3.5e-5, 1e-6
+    watched.past[0, 0], watched.believed[0], watched.left[0] = 0.0, 1e-3 * 0.035, 1e-6
     assert not call_the_roll(watched.block[0], True, np.arange(6) == 0)
     assert watched.left[0] == 0.0
     watched.past[0, 0], watched.left[0] = watched.believed[0], PARAMETERS.fault.roll_call

@@ -24,8 +24,8 @@ _DOUBTFUL_RESIDUAL = 6e-5  # [m]
 _DENIED = 1e-4  # of a motion that far the others must show half, where they can [m]
 _GROUND = 1e-3  # this near the lower stop no gap is at stake any more [m]
 _HEARD = 5  # counts one way that no stuck encoder makes
-_FASTEST = 5e-4  # in a millisecond [m]
-_LEAP = 3.5e-5  # in a millisecond no platen leaves it that fast [m]
+_FASTEST = 0.5  # that a platen moves [m/s]
+_LEAP = 0.035  # no platen leaves it that fast [m/s]
 _AGREED = 2e-5  # how near the others must read to what is foretold then [m]
 
 
@@ -89,7 +89,7 @@ def call_the_roll(g: GuardArrays, flying: bool, counted: Flags) -> bool:
     for i in range(4):
         step = g.believed[i] - g.past[0, i]
         g.answered[i] = max(g.answered[i], int(counted[i]))
-        g.left[i] = g.left[i] + step if abs(step) < 1e3 * g.period * _LEAP else 0.0
+        g.left[i] = g.left[i] + step if abs(step) < g.period * _LEAP else 0.0
         called = called or (g.trust[i] == SOUND and abs(g.left[i]) > g.roll_call)
     found = False
     for i in range(4):
@@ -174,7 +174,7 @@ def listen(g: GuardArrays) -> None:
         if g.trust[4 + k] != LOST or g.stood[k] == 0 or step == 0.0:
             continue
         way = 1 if step > 0.0 else -1
-        if abs(step) > 1e3 * g.period * _FASTEST or way * g.heard[k] < 0:
+        if abs(step) > g.period * _FASTEST or way * g.heard[k] < 0:
             g.heard[k] = 0
         g.heard[k] += way
         if abs(g.heard[k]) >= _HEARD:
