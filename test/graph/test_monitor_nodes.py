@@ -18,6 +18,7 @@ from made_up_run import TOPICS, Encoder, Run, make_run
 from rclpy.duration import Duration
 from rosbags.rosbag2 import Reader
 
+from maglev_model.contract.wire import HARDWARE_ID
 from maglev_monitor.bag.analysis import analyse
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.reader import Bag
@@ -78,12 +79,20 @@ class Feeder:
         for publisher in self._publishers.values():
             self._node.destroy_publisher(publisher)
 
-    def diagnose(self, level: bytes, name: str, text: str, namespace: str = '') -> None:
+    def diagnose(
+        self,
+        level: bytes,
+        name: str,
+        text: str,
+        namespace: str = '',
+        hardware: str = HARDWARE_ID,
+    ) -> None:
         """Publish one status on diagnostics, once somebody listens."""
         publisher = self._node.create_publisher(DiagnosticArray, f'{namespace}/diagnostics', 10)
         while publisher.get_subscription_count() == 0:
             time.sleep(0.02)
-        array = DiagnosticArray(status=[DiagnosticStatus(level=level, name=name, message=text)])
+        status = DiagnosticStatus(level=level, name=name, message=text, hardware_id=hardware)
+        array = DiagnosticArray(status=[status])
         set_stamp(array.header.stamp, time.time_ns())
         publisher.publish(array)
 
@@ -247,6 +256,7 @@ def test_a_fault_fails_the_run(nodes: Nodes, feeder: Feeder) -> None:
     feeder.wait_for(1)
     feeder.feed(0, 1000)
     feeder.diagnose(DiagnosticStatus.WARN, 'controller', 'saturated')
+    feeder.diagnose(DiagnosticStatus.ERROR, 'camera', 'no picture', hardware='a camera')
     feeder.diagnose(DiagnosticStatus.ERROR, 'plant', 'amplifier 3 is spent')
     assert monitor.wait() == 1
     assert 'fault in plant: amplifier 3 is spent' in monitor.output

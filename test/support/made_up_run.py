@@ -16,6 +16,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from maglev_model.contract.controller_watch import Status
 from maglev_model.contract.phases import Phase
+from maglev_model.contract.wire import HARDWARE_ID
 from maglev_monitor.bag.reader import Bag
 from maglev_monitor.bag.writer import BagWriter
 
@@ -184,12 +185,18 @@ class Encoder:
         return bytes(self.store.serialize_cdr(message, name))
 
     def diagnostic(
-        self, stamp: int, level: int, name: str, text: str, values: dict[str, str]
+        self,
+        stamp: int,
+        level: int,
+        name: str,
+        text: str,
+        values: dict[str, str],
+        hardware: str = HARDWARE_ID,
     ) -> bytes:
         """A DiagnosticArray with one status."""
         types = self.store.types
         pairs = [types['diagnostic_msgs/msg/KeyValue'](key, value) for key, value in values.items()]
-        status = types['diagnostic_msgs/msg/DiagnosticStatus'](level, name, text, 'stage', pairs)
+        status = types['diagnostic_msgs/msg/DiagnosticStatus'](level, name, text, hardware, pairs)
         array = types['diagnostic_msgs/msg/DiagnosticArray'](self.header(stamp, ''), [status])
         return bytes(self.store.serialize_cdr(array, 'diagnostic_msgs/msg/DiagnosticArray'))
 

@@ -18,6 +18,7 @@ from rclpy.task import Future
 from rclpy.time_source import CLOCK_TOPIC
 
 from maglev_model import parameters as table
+from maglev_model.contract.wire import HARDWARE_ID
 from maglev_model.parameters import ParameterError, parameter
 from maglev_node import discovery, realtime, ros_parameters
 from maglev_node.polling import PollingNode
@@ -192,7 +193,7 @@ class MaglevNode(PollingNode, Generic[P]):
     def _publish_diagnostics(self) -> None:
         level, message, values = self.diagnose()
         status = DiagnosticStatus(level=level, name=self.get_name(), message=message)
-        status.hardware_id = 'maglev_stage'
+        status.hardware_id = HARDWARE_ID
         status.values = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
         array = DiagnosticArray(status=[status])
         array.header.stamp = self.get_clock().now().to_msg()

@@ -186,6 +186,9 @@ def test_faults_and_limits_of_the_monitor_are_in_the_bag(
     ):
         data = encoder.diagnostic(stamp, level, name, f'{name} says', values)
         writer.write('/diagnostics', [(data, stamp)])
+    for hardware in ('a camera', ''):
+        data = encoder.diagnostic(stamp, 2, 'plant', 'another one', {'run': '{}'}, hardware)
+        writer.write('/diagnostics', [(data, stamp)])
     writer.close()
     assert analyze([str(tmp_path / 'bag')]) == NOT_PASSED
     found = json.loads((tmp_path / 'metrics.json').read_text())

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from maglev_controller.step.arrays import ControlArrays, Record
 from maglev_model.axes import FloatArray
-from maglev_model.compiled import borrowing, compiled
+from maglev_model.compiled import borrowing
 
 IDLE: Final = 0
 """Nothing is learned; what was learned is fed forward."""
@@ -99,20 +99,19 @@ def look_ahead(learning: LearningArrays, control: ControlArrays, follows: bool) 
             axes[axis].learned += state.share[table] * learning.tables[table, place, axis]
 
 
-@compiled
+@borrowing
 def _write_next(learning: LearningArrays, place: int) -> None:
     """One row of the next table, from what lies around it."""
     state, samples, reach = learning.state[0], learning.state[0].samples, learning.state[0].reach
-    known, shown = np.zeros(5), np.zeros(5)
-    for m in range(2 * reach + 1):
-        row = (place + m - reach) % samples
-        for axis in range(5):
-            known[axis] += learning.kernels[0, m] * learning.tables[state.used, row, axis]
-            shown[axis] += learning.kernels[0, m] * learning.made[row, axis]
-            shown[axis] -= learning.kernels[1, m] * learning.error[row, axis]
     gain = state.gain / (1.0 + state.gain * state.flown)
     for axis in range(5):
-        limit, value = state.limit[axis], known[axis] + gain * (shown[axis] - known[axis])
+        known = shown = 0.0
+        for m in range(2 * reach + 1):
+            row = (place + m - reach) % samples
+            known += learning.kernels[0, m] * learning.tables[state.used, row, axis]
+            shown += learning.kernels[0, m] * learning.made[row, axis]
+            shown -= learning.kernels[1, m] * learning.error[row, axis]
+        limit, value = state.limit[axis], known + gain * (shown - known)
         learning.tables[state.next, place, axis] = min(max(value, -limit), limit)
 
 

@@ -37,6 +37,9 @@ class TopicType(NamedTuple):
     fields: tuple[Field, ...]
 
 
+HARDWARE_ID = 'maglev_stage'
+"""``hardware_id`` of what the nodes say on ``diagnostics``; others may speak there of their own."""
+
 TOPIC_TYPES = {
     'reference': TopicType(
         'maglev_msgs/msg/Reference',

@@ -17,7 +17,7 @@ from rosbags.rosbag2 import Reader
 from rosbags.serde.errors import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
-from maglev_model.contract.wire import KEY_OF_MESSAGE_TYPE, PROGRESS_SUFFIX
+from maglev_model.contract.wire import HARDWARE_ID, KEY_OF_MESSAGE_TYPE, PROGRESS_SUFFIX
 from maglev_model.programs.progress import Progress
 from maglev_monitor.bag.errors import BagError
 from maglev_monitor.bag.mcap_file import MAGIC_BYTES, McapFile, TopicMessages
@@ -190,6 +190,7 @@ class Bag:
                 {pair.key: pair.value for pair in status.values},
             )
             for status in array.status
+            if status.hardware_id == HARDWARE_ID
         ]
 
 

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
-from maglev_model.contract.wire import DecodeError
+from maglev_model.contract.wire import HARDWARE_ID, DecodeError
 from maglev_model.parameters import parameter
 from maglev_monitor.live.discovery import DiscoveryWatch
 from maglev_monitor.live.run_watch import RunWatch, WatchParameters
@@ -145,7 +145,8 @@ class MonitorNode(WatcherNode[MonitorParameters]):
 
     def _on_diagnostics(self, message: Any) -> None:
         for status in message.status:
-            if status.level[0] < FAULT_LEVEL or status.name == self.get_name() or self._concluded:
+            ours = status.hardware_id == HARDWARE_ID and status.name != self.get_name()
+            if not ours or status.level[0] < FAULT_LEVEL or self._concluded:
                 continue
             stamp = nanoseconds(message.header.stamp)
             if self._watch.add_fault(stamp, status.name, status.message, time.monotonic()):

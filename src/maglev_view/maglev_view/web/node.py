@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
-from maglev_model.contract.wire import DecodeError
+from maglev_model.contract.wire import HARDWARE_ID, DecodeError
 from maglev_monitor.metrics.decoding import decode
 from maglev_node.node import MaglevNode, NodeError, NodeParameters
 from maglev_node.topics import (
@@ -90,6 +90,8 @@ class WebNode(MaglevNode[WebNodeParameters]):
 
     def _on_diagnostics(self, message: Any) -> None:
         for status in message.status:
+            if status.hardware_id != HARDWARE_ID:
+                continue
             values = {each.key: each.value for each in status.values}
             self._live.told(status.name, status.level[0], status.message, values)
 
