@@ -17,10 +17,9 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, W
 from rosbags.typesys import Stores, get_typestore
 from std_msgs.msg import String
 
-from maglev_monitor.bag.chunk_file import ChunkFile
 from maglev_monitor.bag.reader import Bag
 from maglev_monitor.bag.recorder import message_folder
-from maglev_monitor.bag.writer import BagWriter
+from maglev_monitor.bag.writer import BagWriter, ChunkFile
 from maglev_ros2cli.commands.bag_info import moment, size
 
 START = 1_795_270_476_273_521_421

@@ -21,8 +21,8 @@ from std_msgs.msg import (
 from std_srvs.srv import Trigger
 
 from maglev_msgs.msg import Measurement
-from maglev_ros2cli.errors import CommandError
 from maglev_ros2cli.messages import Form, as_csv, as_yaml, fill, find_type, values_of
+from maglev_ros2cli.parser import CommandError
 
 
 @pytest.fixture

@@ -21,8 +21,7 @@ from rosbags.interfaces import Qos, QosTime
 from rosbags.rosbag2 import Reader
 from rosbags.rosbag2.errors import ReaderError
 
-from maglev_ros2cli.errors import CommandError
-from maglev_ros2cli.parser import Parser
+from maglev_ros2cli.parser import CommandError, Parser
 from maglev_ros2cli.qos import POLICIES
 
 STORAGES = {'.mcap': 'mcap', '.db3': 'sqlite3'}

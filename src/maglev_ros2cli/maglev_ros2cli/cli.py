@@ -14,8 +14,7 @@ from typing import NoReturn
 import argcomplete
 
 from maglev_model.programs.command import unwritten
-from maglev_ros2cli.errors import CommandError
-from maglev_ros2cli.parser import SUBSET, Parser
+from maglev_ros2cli.parser import SUBSET, CommandError, Parser
 
 COMMANDS = {
     'bag': 'Various rosbag related sub-commands',

@@ -6,7 +6,7 @@ import contextlib
 import math
 import os
 import time
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from typing import Any, NamedTuple
 
 import rclpy
@@ -18,8 +18,7 @@ from rclpy.validate_full_topic_name import validate_full_topic_name
 from maglev_model.programs.arguments import not_negative
 from maglev_node.dds import local_participants, only_here, prepare_middleware
 from maglev_node.polling import PollingNode
-from maglev_ros2cli.errors import CommandError
-from maglev_ros2cli.parser import Parser, Verbs, complete
+from maglev_ros2cli.parser import CommandError, Parser, Verbs, complete
 
 QUIET = 0.15
 """Discovery ends when every participant of this machine is seen and nothing new comes so long [s].
@@ -71,7 +70,7 @@ def add_arguments(parser: Parser) -> None:
         metavar='SECONDS',
         help='Time to wait for discovery (default: until nothing new comes)',
     )
-    parser.add_argument('--no-daemon', action='store_true', help='As ever: this ros2 has no daemon')
+    parser.flag('--no-daemon', help='As ever: this ros2 has no daemon')
 
 
 @contextlib.contextmanager
@@ -126,9 +125,7 @@ def graph_with(arguments: Any) -> Iterator[tuple[PollingNode, str]]:
 
 
 def discover(
-    own: PollingNode,
-    spin_time: float | None = None,
-    needed: Callable[[], bool] | None = None,
+    own: PollingNode, spin_time: float | None = None, needed: Callable[[], bool] | None = None
 ) -> bool:
     """Wait for ``spin_time`` [s], by default until the graph is known.
 
@@ -141,7 +138,11 @@ def discover(
         now = time.monotonic()
         if needed is not None and needed():
             return True
-        state = _state(own)
+        state = (
+            own.get_node_names_and_namespaces(),
+            own.get_topic_names_and_types(),
+            own.get_service_names_and_types(),
+        )
         if state != seen:
             seen, changed = state, now
         if spin_time is not None:
@@ -165,14 +166,6 @@ def _complete(own: PollingNode, waited: float) -> bool:
         bytes(info.endpoint_gid[:_PREFIX]) for info in infos if info.node_name != _UNKNOWN
     }
     return len(participants) >= there and (only_here() or waited >= ABROAD_WAIT)
-
-
-def _state(own: PollingNode) -> object:
-    return (
-        own.get_node_names_and_namespaces(),
-        own.get_topic_names_and_types(),
-        own.get_service_names_and_types(),
-    )
 
 
 def wait_until(condition: Callable[[], bool], timeout: float | None = None) -> bool:
@@ -280,35 +273,32 @@ def add_node_verb(verbs: Verbs, name: str, run: Any, text: str, **node: Any) -> 
     verb = verbs.add(name, run, text)
     add_arguments(verb)
     add_node_name(verb, **node)
-    verb.add_argument(
-        '--include-hidden-nodes', action='store_true', help='Consider hidden nodes as well'
-    )
+    verb.flag('--include-hidden-nodes', help='Consider hidden nodes as well')
     return verb
 
 
 def add_node_name(parser: Parser, **options: Any) -> None:
     """The argument ``node_name``, completed from the graph."""
     argument = parser.add_argument('node_name', help='Name of the ROS node', **options)
-    complete(argument, lambda given: _seen(given, lambda own: [each.full for each in nodes(own)]))
+    complete(argument, lambda given: _seen(given, lambda own: (one.full for one in nodes(own))))
 
 
 def add_topic_name(parser: Parser, text: str) -> None:
     """The argument ``topic_name``, completed from the graph."""
-    argument = parser.add_argument('topic_name', help=text)
-    complete(argument, seen_topics)
+    complete(parser.add_argument('topic_name', help=text), seen_topics)
 
 
 def add_service_name(parser: Parser, text: str) -> None:
     """The argument ``service_name``, completed from the graph."""
     argument = parser.add_argument('service_name', help=text)
-    complete(argument, lambda given: _seen(given, lambda own: list(services(own, hidden=False))))
+    complete(argument, lambda given: _seen(given, lambda own: services(own, hidden=False)))
 
 
 def seen_topics(given: Any) -> list[str]:
     """The topics that a shell offers."""
-    return _seen(given, lambda own: list(topics(own, hidden=False)))
+    return _seen(given, lambda own: topics(own, hidden=False))
 
 
-def _seen(given: Any, look: Callable[[PollingNode], list[str]]) -> list[str]:
+def _seen(given: Any, look: Callable[[PollingNode], Iterable[str]]) -> list[str]:
     with graph(given) as own:
-        return look(own)
+        return list(look(own))

@@ -9,7 +9,7 @@ from pathlib import Path
 from ament_index_python import get_resource, get_resources
 from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 
-from maglev_ros2cli.errors import CommandError
+from maglev_ros2cli.parser import CommandError
 
 KINDS = {'msg': 'Messages', 'srv': 'Services', 'action': 'Actions'}
 """The kinds of interfaces, with what they are called."""

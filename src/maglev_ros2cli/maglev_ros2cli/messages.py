@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from maglev_ros2cli.errors import CommandError
+from maglev_ros2cli.parser import CommandError
 
 Stamper = Callable[[Any], None]
 """Sets a time of a message, as it is published, to the one it is given."""

@@ -11,11 +11,10 @@ from ament_index_python.packages import (
     get_packages_with_prefixes,
 )
 
-from maglev_ros2cli.errors import CommandError
+from maglev_ros2cli.parser import CommandError
 
 
 def names() -> list[str]:
-    """All packages, sorted."""
     return sorted(get_packages_with_prefixes())
 
 

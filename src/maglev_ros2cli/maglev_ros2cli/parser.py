@@ -1,4 +1,4 @@
-"""Parsers that say, of what they do not know, where it can be had."""
+"""Parsers that say, of what they do not know, where it can be had; and what ends a command."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ import sys
 from collections.abc import Callable, Iterable
 from typing import Any, NoReturn
 
-from maglev_ros2cli.errors import CommandError
-
 SUBSET = (
     'This ros2 is a small one, for ROS 2 from pip wheels: a native installation of ROS 2 Jazzy has'
     ' every verb and option.'
 )
+
+
+class CommandError(RuntimeError):
+    """What was asked cannot be done; the message goes to stderr, the exit code is 1."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -20,6 +22,10 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, **arguments: Any) -> None:
         super().__init__(**{'allow_abbrev': False, **arguments})
+
+    def flag(self, *names: str, help: str) -> None:
+        """An option without a value."""
+        self.add_argument(*names, action='store_true', help=help)
 
     def error(self, message: str) -> NoReturn:
         """End with exit code 2; of an unknown verb or option, say that there are more elsewhere."""

@@ -25,6 +25,10 @@ POLICIES: dict[str, Any] = {
     'durability': DurabilityPolicy,
     'liveliness': LivelinessPolicy,
 }
+_STRENGTHS: tuple[tuple[str, Any, Any], ...] = (
+    ('reliability', ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT),
+    ('durability', DurabilityPolicy.TRANSIENT_LOCAL, DurabilityPolicy.VOLATILE),
+)
 
 
 def add_arguments(parser: Parser, default: str) -> None:
@@ -86,30 +90,13 @@ def matching(node: Node, topic: str, profile: QoSProfile) -> QoSProfile:
     """
     offers = [info.qos_profile for info in node.get_publishers_info_by_topic(topic)]
     profile = copy.copy(profile)
-    if offers:
-        profile.reliability = _common(
-            [offer.reliability for offer in offers],
-            ReliabilityPolicy.RELIABLE,
-            ReliabilityPolicy.BEST_EFFORT,
-        )
-        profile.durability = _common(
-            [offer.durability for offer in offers],
-            DurabilityPolicy.TRANSIENT_LOCAL,
-            DurabilityPolicy.VOLATILE,
-        )
+    for name, strong, weak in _STRENGTHS if offers else ():
+        offered = [getattr(offer, name) for offer in offers]
+        setattr(profile, name, strong if all(each == strong for each in offered) else weak)
+        if strong in offered and getattr(profile, name) == weak:
+            kind = type(strong).__name__
+            print(
+                f'Some, but not all, publishers are offering {kind}.{strong.name}. Falling back to'
+                f' {kind}.{weak.name} as it will connect to all publishers'
+            )
     return profile
-
-
-def _common(offered: list[Any], strong: Any, weak: Any) -> Any:
-    if all(policy == strong for policy in offered):
-        return strong
-    if strong in offered:
-        print(
-            f'Some, but not all, publishers are offering {_name(strong)}. Falling back to'
-            f' {_name(weak)} as it will connect to all publishers'
-        )
-    return weak
-
-
-def _name(policy: Any) -> str:
-    return f'{type(policy).__name__}.{policy.name}'

@@ -7,7 +7,6 @@ from maglev_ros2cli.parser import Parser, Verbs
 
 
 def add(parser: Parser) -> None:
-    """Give the verbs to a parser."""
     verbs = Verbs(parser)
     bag_info.add(verbs)
     bag_play.add(verbs)

@@ -18,14 +18,12 @@ _UNITS = ('B', 'KiB', 'MiB', 'GiB', 'TiB')
 
 
 def add(verbs: Verbs) -> None:
-    """Give the verb to its command."""
     verb = verbs.add('info', info, 'Print information about a bag to the screen')
     add_bag_path(verb)
-    verb.add_argument('-t', '--topic-name', action='store_true', help='Only display topic names')
+    verb.flag('-t', '--topic-name', help='Only display topic names')
 
 
 def info(arguments: Any) -> None:
-    """Print it."""
     with opened(arguments.bag_path) as reader:
         if arguments.topic_name:
             lines = [connection.topic for connection in reader.connections]
@@ -38,23 +36,23 @@ def info(arguments: Any) -> None:
 def _lines(reader: Reader, paths: list[Path]) -> Iterator[str]:
     first = reader.start_time if reader.message_count else 0
     duration = reader.duration - 1 if reader.message_count else 0  # to after the last, for rosbags
+    entries = {
+        'Files:': [path.name for path in paths],
+        'Bag size:': [size(sum(path.stat().st_size for path in paths))],
+        'Storage id:': [storage(paths[0])],
+        'ROS Distro:': [reader.ros_distro or 'unknown'],
+        'Duration:': [f'{seconds(duration)}s'],
+        'Start:': [moment(first)],
+        'End:': [moment(first + duration)],
+        'Messages:': [str(reader.message_count)],
+        'Topic information:': [_topic(each) for each in reader.connections],
+        'Service:': ['0'],
+    }
     yield ''
-    yield from _entry('Files:', [path.name for path in paths])
-    yield from _entry('Bag size:', [size(sum(path.stat().st_size for path in paths))])
-    yield from _entry('Storage id:', [storage(paths[0])])
-    yield from _entry('ROS Distro:', [reader.ros_distro or 'unknown'])
-    yield from _entry('Duration:', [f'{seconds(duration)}s'])
-    yield from _entry('Start:', [moment(first)])
-    yield from _entry('End:', [moment(first + duration)])
-    yield from _entry('Messages:', [str(reader.message_count)])
-    yield from _entry('Topic information:', [_topic(each) for each in reader.connections])
-    yield from _entry('Service:', ['0'])
+    for title, values in entries.items():
+        for number, value in enumerate(values):
+            yield f'{"" if number else title:<{_INDENT}}{value}'
     yield 'Service information: '
-
-
-def _entry(title: str, values: list[str]) -> Iterator[str]:
-    for number, value in enumerate(values):
-        yield f'{"" if number else title:<{_INDENT}}{value}'
 
 
 def _topic(connection: Connection) -> str:

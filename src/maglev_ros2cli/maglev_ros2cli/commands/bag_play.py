@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from rclpy.duration import Duration
-from rosbags.interfaces import Connection, ConnectionExtRosbag2
+from rosbags.interfaces import Connection
 from rosbags.rosbag2 import Reader
 from rosgraph_msgs.msg import Clock
 
@@ -16,42 +16,30 @@ from maglev_model.programs.arguments import not_negative, positive
 from maglev_node.polling import PollingNode
 from maglev_node.stamp import set_stamp
 from maglev_ros2cli.bags import add_bag_path, add_overrides, opened, overrides, profile
-from maglev_ros2cli.errors import CommandError
 from maglev_ros2cli.graph import discover, node
 from maglev_ros2cli.messages import find_type
-from maglev_ros2cli.parser import Verbs
+from maglev_ros2cli.parser import CommandError, Verbs
 
 _CLOCK_RATE = 40.0
+_UNKNOWN_QOS = 10  # messages, where nobody tells what the publishers offered
 _DELIVERY = 3.0
 """Longest wait for the last messages to arrive [s]."""
 
 
 def add(verbs: Verbs) -> None:
-    """Give the verb to its command."""
     verb = verbs.add('play', play, 'Play back ROS data from a bag')
     add_bag_path(verb)
     verb.add_argument('-r', '--rate', type=positive, default=1.0, help='Rate at which to play')
-    verb.add_argument('-l', '--loop', action='store_true', help='Play again when it has ended')
+    verb.flag('-l', '--loop', help='Play again when it has ended')
     verb.add_argument('--topics', nargs='+', metavar='TOPIC', help='To replay (default: all)')
     verb.add_argument('-m', '--remap', nargs='+', default=[], metavar='OLD:=NEW', help='New names')
-    verb.add_argument(
-        '--clock',
-        type=positive,
-        nargs='?',
-        const=_CLOCK_RATE,
-        metavar='HZ',
-        help=f'Publish to /clock at a rate, by default {_CLOCK_RATE:g} Hz',
-    )
-    verb.add_argument('-d', '--delay', type=not_negative, default=0.0, help='Sleep SEC before play')
-    verb.add_argument(
-        '--start-offset',
-        type=not_negative,
-        default=0.0,
-        help='Start from this many seconds into the bag',
-    )
-    verb.add_argument(
-        '--disable-keyboard-controls', action='store_true', help='As ever: there are none'
-    )
+    add = verb.add_argument
+    clock = f'Publish to /clock at a rate, by default {_CLOCK_RATE:g} Hz'
+    add('--clock', type=positive, nargs='?', const=_CLOCK_RATE, metavar='HZ', help=clock)
+    add('-d', '--delay', type=not_negative, default=0.0, help='Sleep SEC before play')
+    start = 'Start from this many seconds into the bag'
+    add('--start-offset', type=not_negative, default=0.0, help=start)
+    verb.flag('--disable-keyboard-controls', help='As ever: there are none')
     add_overrides(verb)
 
 
@@ -90,7 +78,9 @@ class _Player:
             except CommandError as error:
                 own.get_logger().warning(f"Ignoring a topic '{topic}', reason: {error}")
                 continue
-            qos = given.get(topic) or _recorded(connection)
+            offered = getattr(connection.ext, 'offered_qos_profiles', ())
+            recorded = profile(offered[0]) if offered else _UNKNOWN_QOS
+            qos = given.get(topic, recorded)
             name = renamed.get(topic, topic)
             self._publishers[connection.id] = own.create_publisher(kind, name, qos)
         self._period = 1.0 / arguments.clock if arguments.clock else math.inf
@@ -127,16 +117,6 @@ class _Player:
             if now >= due:
                 return
             time.sleep(min(due - now, self._period))
-
-
-def _recorded(connection: Connection) -> Any:
-    """The QoS that the topic's publishers offered, 10 messages where that is not known."""
-    offered = (
-        connection.ext.offered_qos_profiles
-        if isinstance(connection.ext, ConnectionExtRosbag2)
-        else []
-    )
-    return profile(offered[0]) if offered else 10
 
 
 def _renamed(rules: list[str]) -> dict[str, str]:

@@ -21,10 +21,9 @@ from maglev_monitor.bag.writer import BagWriter
 from maglev_node.polling import PolledSubscription, PollingNode
 from maglev_ros2cli import qos
 from maglev_ros2cli.bags import add_overrides, overrides
-from maglev_ros2cli.errors import CommandError
 from maglev_ros2cli.graph import absolute, add_arguments, discover, node, seen_topics, topics
 from maglev_ros2cli.messages import find_type
-from maglev_ros2cli.parser import Verbs, complete
+from maglev_ros2cli.parser import CommandError, Verbs, complete
 
 _POLL, _FLUSH = 0.05, 1.0
 _DEPTH = 20000
@@ -32,32 +31,28 @@ _DEPTH = 20000
 
 
 def add(verbs: Verbs) -> None:
-    """Give the verb to its command."""
     verb = verbs.add('record', record, 'Record ROS data to a bag')
     chosen = verb.add_argument('topics_positional', nargs='*', metavar='topic', help='To record')
     complete(chosen, seen_topics)
     verb.add_argument('--topics', nargs='+', default=[], metavar='TOPIC', help='To record')
-    verb.add_argument('-a', '--all', action='store_true', help='Record all topics')
+    verb.flag('-a', '--all', help='Record all topics')
     verb.add_argument('--all-topics', dest='all', action='store_true', help='Record all topics')
     verb.add_argument('-e', '--regex', type=_expression, help='Topics that contain this expression')
     verb.add_argument('--exclude-regex', type=_expression, help='And leave out those with this one')
     verb.add_argument(
         '--exclude-topics', nargs='+', default=[], metavar='TOPIC', help='Leave these out'
     )
-    verb.add_argument('--include-hidden-topics', action='store_true', help='Also hidden topics')
+    verb.flag('--include-hidden-topics', help='Also hidden topics')
     verb.add_argument('-o', '--output', type=Path, help="The bag's folder, which is made")
     verb.add_argument('-s', '--storage', choices=['mcap'], default='mcap', help='Kind of storage')
-    verb.add_argument('--no-discovery', action='store_true', help='Only topics there at the start')
+    verb.flag('--no-discovery', help='Only topics there at the start')
     verb.add_argument('--node-name', default='rosbag2_recorder', help="The recorder's name")
-    verb.add_argument(
-        '--disable-keyboard-controls', action='store_true', help='As ever: there are none'
-    )
+    verb.flag('--disable-keyboard-controls', help='As ever: there are none')
     add_arguments(verb)
     add_overrides(verb)
 
 
 def record(arguments: Any) -> None:
-    """Write until interrupted."""
     arguments.topics = [absolute(each) for each in arguments.topics + arguments.topics_positional]
     if not (arguments.all or arguments.topics or arguments.regex):
         raise CommandError(

@@ -5,13 +5,11 @@ from __future__ import annotations
 import sys
 from typing import Any
 
-from maglev_ros2cli.errors import CommandError
 from maglev_ros2cli.interfaces import KINDS, names, shown
-from maglev_ros2cli.parser import Parser, Verbs, complete
+from maglev_ros2cli.parser import CommandError, Parser, Verbs, complete
 
 
 def add(parser: Parser) -> None:
-    """Give the verbs to a parser."""
     verbs = Verbs(parser)
     verb = verbs.add('list', list_, 'List all interface types available')
     for kind, title in KINDS.items():
@@ -36,7 +34,6 @@ def add(parser: Parser) -> None:
 
 
 def list_(arguments: Any) -> None:
-    """All interfaces by kind."""
     for kind, title in KINDS.items():
         if not arguments.kinds or kind in arguments.kinds:
             print(f'{title}:')
@@ -45,7 +42,6 @@ def list_(arguments: Any) -> None:
 
 
 def show(arguments: Any) -> None:
-    """One interface."""
     name = sys.stdin.readline().strip() if arguments.type == '-' else arguments.type
     if not name:
         raise CommandError('the passed value is empty')

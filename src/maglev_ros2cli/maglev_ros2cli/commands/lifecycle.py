@@ -9,7 +9,6 @@ from lifecycle_msgs.msg import TransitionDescription
 from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
 
 from maglev_node.polling import PollingNode
-from maglev_ros2cli.errors import CommandError
 from maglev_ros2cli.graph import (
     add_arguments,
     add_node_verb,
@@ -22,22 +21,19 @@ from maglev_ros2cli.graph import (
     print_all,
     services,
 )
-from maglev_ros2cli.parser import Parser, Verbs, complete
+from maglev_ros2cli.parser import CommandError, Parser, Verbs, complete
 
 _GET_STATE = 'lifecycle_msgs/srv/GetState'
 
 
 def add(parser: Parser) -> None:
-    """Give the verbs to a parser."""
     verbs = Verbs(parser)
     add_node_verb(verbs, 'get', get, 'Get lifecycle state for one or more nodes', nargs='?')
     add_node_verb(verbs, 'list', list_, 'Output a list of available transitions')
     verb = verbs.add('nodes', nodes_, 'Output a list of nodes with lifecycle')
     add_arguments(verb)
-    verb.add_argument('-a', '--all', action='store_true', help='Display all nodes, also hidden')
-    verb.add_argument(
-        '-c', '--count-nodes', action='store_true', help='Only display the number of nodes'
-    )
+    verb.flag('-a', '--all', help='Display all nodes, also hidden')
+    verb.flag('-c', '--count-nodes', help='Only display the number of nodes')
     verb = add_node_verb(verbs, 'set', set_, 'Trigger lifecycle state transition')
     transition = verb.add_argument('transition', help='The lifecycle transition')
 
@@ -49,14 +45,12 @@ def add(parser: Parser) -> None:
 
 
 def nodes_(arguments: Any) -> None:
-    """The managed nodes."""
     with graph(arguments) as own:
         names = _managed(own, hidden=arguments.all)
     print_all(names, count=arguments.count_nodes)
 
 
 def get(arguments: Any) -> None:
-    """The state of one managed node, or of all."""
     if arguments.node_name:
         with graph_with(arguments) as (own, full):
             print(_state(own, full))

@@ -12,37 +12,23 @@ from rclpy.action import (
 from rclpy.topic_or_service_is_hidden import topic_or_service_is_hidden
 
 from maglev_node.polling import PollingNode
-from maglev_ros2cli.errors import CommandError
-from maglev_ros2cli.graph import (
-    absolute,
-    add_arguments,
-    add_node_name,
-    graph,
-    nodes,
-    print_all,
-)
-from maglev_ros2cli.parser import Parser, Verbs
+from maglev_ros2cli.graph import absolute, add_arguments, add_node_name, graph, nodes, print_all
+from maglev_ros2cli.parser import CommandError, Parser, Verbs
 
 
 def add(parser: Parser) -> None:
-    """Give the verbs to a parser."""
     verbs = Verbs(parser)
     verb = verbs.add('info', info, 'Output information about a node')
     add_arguments(verb)
     add_node_name(verb)
-    verb.add_argument(
-        '--include-hidden', action='store_true', help='Display hidden topics and services as well'
-    )
+    verb.flag('--include-hidden', help='Display hidden topics and services as well')
     verb = verbs.add('list', list_, 'Output a list of available nodes')
     add_arguments(verb)
-    verb.add_argument('-a', '--all', action='store_true', help='Display all nodes, also hidden')
-    verb.add_argument(
-        '-c', '--count-nodes', action='store_true', help='Only display the number of nodes'
-    )
+    verb.flag('-a', '--all', help='Display all nodes, also hidden')
+    verb.flag('-c', '--count-nodes', help='Only display the number of nodes')
 
 
 def list_(arguments: Any) -> None:
-    """All nodes, sorted."""
     with graph(arguments) as own:
         names = [each.full for each in nodes(own, hidden=arguments.all)]
     if not arguments.count_nodes and len(names) > len(set(names)):
@@ -55,7 +41,6 @@ def list_(arguments: Any) -> None:
 
 
 def info(arguments: Any) -> None:
-    """A node's topics, services and actions."""
     full = absolute(arguments.node_name)
     with graph(arguments) as own:
         same = [each for each in nodes(own, hidden=True) if each.full == full]

@@ -16,16 +16,8 @@ from rclpy.parameter import (
 )
 
 from maglev_node.polling import PollingNode
-from maglev_ros2cli.errors import CommandError
-from maglev_ros2cli.graph import (
-    add_node_verb,
-    ask,
-    graph,
-    graph_with,
-    nodes,
-    services,
-)
-from maglev_ros2cli.parser import Parser, Verbs, complete
+from maglev_ros2cli.graph import add_node_verb, ask, graph, graph_with, nodes, services
+from maglev_ros2cli.parser import CommandError, Parser, Verbs, complete
 
 _TYPES = {
     ParameterType.PARAMETER_NOT_SET: ('not set', 'Parameter not set.'),
@@ -43,7 +35,6 @@ _TYPES = {
 
 
 def add(parser: Parser) -> None:
-    """Give the verbs to a parser."""
     verbs = Verbs(parser)
     verb = add_node_verb(
         verbs, 'describe', describe, 'Show descriptive information about parameters'
@@ -52,17 +43,15 @@ def add(parser: Parser) -> None:
     add_node_verb(verbs, 'dump', dump, 'Show all of the parameters of a node in a YAML file format')
     verb = add_node_verb(verbs, 'get', get, 'Get parameter')
     _add_parameter_name(verb, 'parameter_name')
-    verb.add_argument('--hide-type', action='store_true', help='Hide the type information')
+    verb.flag('--hide-type', help='Hide the type information')
     verb = add_node_verb(verbs, 'list', list_, 'Output a list of available parameters', nargs='?')
     verb.add_argument(
         '--param-prefixes', nargs='+', default=[], help='Only parameters with these prefixes'
     )
-    verb.add_argument('--param-type', action='store_true', help='Also print the types')
+    verb.flag('--param-type', help='Also print the types')
     verb = add_node_verb(verbs, 'load', load, 'Load parameter file for a node')
     verb.add_argument('parameter_file', type=Path, help='Parameter file')
-    verb.add_argument(
-        '--no-use-wildcard', action='store_true', help="Leave out what is given for '/**'"
-    )
+    verb.flag('--no-use-wildcard', help="Leave out what is given for '/**'")
     verb = add_node_verb(verbs, 'set', set_, 'Set parameter')
     _add_parameter_name(verb, 'parameter_name')
     verb.add_argument('value', help='Value of the parameter')
@@ -79,7 +68,6 @@ def _add_parameter_name(verb: Parser, name: str, **options: Any) -> None:
 
 
 def list_(arguments: Any) -> None:
-    """The parameters of one node, or of all that have some."""
     if arguments.node_name:
         with graph_with(arguments) as (own, full):
             _print_names(own, full, arguments)
@@ -100,7 +88,6 @@ def _print_names(own: PollingNode, full: str, arguments: Any) -> None:
 
 
 def get(arguments: Any) -> None:
-    """One value."""
     with graph_with(arguments) as (own, full):
         values = _values(own, full, [arguments.parameter_name])
     if not values:
@@ -122,7 +109,6 @@ def set_(arguments: Any) -> None:
 
 
 def load(arguments: Any) -> None:
-    """All that a file gives for a node."""
     with graph_with(arguments) as (own, full):
         try:
             given = parameter_dict_from_yaml_file(
@@ -140,7 +126,6 @@ def load(arguments: Any) -> None:
 
 
 def describe(arguments: Any) -> None:
-    """Type, text and bounds of parameters."""
     with graph_with(arguments) as (own, full):
         descriptors = _descriptors(own, full, arguments.parameter_names)
     for descriptor in descriptors:
@@ -148,7 +133,6 @@ def describe(arguments: Any) -> None:
 
 
 def dump(arguments: Any) -> None:
-    """All parameters of a node, as a parameter file."""
     with graph_with(arguments) as (own, full):
         names = _names(own, full)
         values = _values(own, full, names)

@@ -8,12 +8,10 @@ import shlex
 from typing import Any, NoReturn
 
 from maglev_ros2cli import packages
-from maglev_ros2cli.errors import CommandError
-from maglev_ros2cli.parser import Parser, complete
+from maglev_ros2cli.parser import CommandError, Parser, complete
 
 
 def add(parser: Parser) -> None:
-    """Give the arguments to a parser."""
     parser.add_argument(
         '--prefix', help="Prefix command, in quotes if it has spaces (--prefix 'gdb -ex run')"
     )

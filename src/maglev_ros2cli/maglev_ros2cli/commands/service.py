@@ -28,7 +28,6 @@ _FIRST_LOOK = 0.1
 
 
 def add(parser: Parser) -> None:
-    """Give the verbs to a parser."""
     verbs = Verbs(parser)
     verb = verbs.add('call', call, 'Call a service')
     add_service_name(verb, "Name of the ROS service to call to (e.g. '/add_two_ints')")
@@ -37,24 +36,19 @@ def add(parser: Parser) -> None:
     verb.add_argument(
         'values', nargs='?', default='{}', help="The request's values in YAML: '{a: 1, b: 2}'"
     )
-    verb.add_argument('--stdin', action='store_true', help='Read values from standard input')
+    verb.flag('--stdin', help='Read values from standard input')
     verb.add_argument('-r', '--rate', type=positive, metavar='N', help='Repeat the call at N Hz')
     verb = verbs.add('list', list_, 'Output a list of available services')
     add_arguments(verb)
-    verb.add_argument('-t', '--show-types', action='store_true', help='Also show the types')
-    verb.add_argument(
-        '-c', '--count-services', action='store_true', help='Only display the number of services'
-    )
-    verb.add_argument(
-        '-a', '--include-hidden-services', action='store_true', help='Also hidden services'
-    )
+    verb.flag('-t', '--show-types', help='Also show the types')
+    verb.flag('-c', '--count-services', help='Only display the number of services')
+    verb.flag('-a', '--include-hidden-services', help='Also hidden services')
     verb = verbs.add('type', type_, "Output a service's type")
     add_arguments(verb)
     add_service_name(verb, 'Name of the ROS service to get type (e.g. "/talker/list_parameters")')
 
 
 def list_(arguments: Any) -> None:
-    """All services, sorted."""
     with graph(arguments) as own:
         found = services(own, hidden=arguments.include_hidden_services)
     shown = [
@@ -65,7 +59,6 @@ def list_(arguments: Any) -> None:
 
 
 def type_(arguments: Any) -> int:
-    """The type of one service."""
     return print_type(arguments, arguments.service_name, services)
 
 

@@ -5,32 +5,24 @@ from __future__ import annotations
 from typing import Any
 
 from maglev_ros2cli.commands import topic_echo, topic_hz, topic_pub
-from maglev_ros2cli.errors import CommandError
 from maglev_ros2cli.graph import absolute, add_arguments, add_topic_name, graph, print_type, topics
-from maglev_ros2cli.parser import Parser, Verbs
+from maglev_ros2cli.parser import CommandError, Parser, Verbs
 
 
 def add(parser: Parser) -> None:
-    """Give the verbs to a parser."""
     verbs = Verbs(parser)
     topic_echo.add(verbs)
     topic_hz.add(verbs)
     verb = verbs.add('info', info, 'Print information about a topic')
     add_arguments(verb)
     add_topic_name(verb, "Name of the ROS topic to get info (e.g. '/chatter')")
-    verb.add_argument(
-        '-v', '--verbose', action='store_true', help='Also node names, QoS and types of endpoints'
-    )
+    verb.flag('-v', '--verbose', help='Also node names, QoS and types of endpoints')
     verb = verbs.add('list', list_, 'Output a list of available topics')
     add_arguments(verb)
-    verb.add_argument('-t', '--show-types', action='store_true', help='Also show the topic type')
-    verb.add_argument(
-        '-c', '--count-topics', action='store_true', help='Only display the number of topics'
-    )
-    verb.add_argument(
-        '-a', '--include-hidden-topics', action='store_true', help='Also hidden topics'
-    )
-    verb.add_argument('-v', '--verbose', action='store_true', help='List details of each topic')
+    verb.flag('-t', '--show-types', help='Also show the topic type')
+    verb.flag('-c', '--count-topics', help='Only display the number of topics')
+    verb.flag('-a', '--include-hidden-topics', help='Also hidden topics')
+    verb.flag('-v', '--verbose', help='List details of each topic')
     topic_pub.add(verbs)
     verb = verbs.add('type', type_, "Print a topic's type")
     add_arguments(verb)
@@ -38,7 +30,6 @@ def add(parser: Parser) -> None:
 
 
 def list_(arguments: Any) -> None:
-    """All topics, sorted."""
     with graph(arguments) as own:
         found = topics(own, hidden=arguments.include_hidden_topics)
         if arguments.count_topics:
@@ -65,7 +56,6 @@ def _print_counts(
 
 
 def info(arguments: Any) -> None:
-    """Type and endpoints of a topic."""
     name = absolute(arguments.topic_name)
     with graph(arguments) as own:
         types = topics(own).get(name)
@@ -84,5 +74,4 @@ def info(arguments: Any) -> None:
 
 
 def type_(arguments: Any) -> int:
-    """The type of one topic."""
     return print_type(arguments, arguments.topic_name, topics)

@@ -10,10 +10,9 @@ from typing import Any
 from maglev_model.programs.arguments import count, not_negative
 from maglev_node.polling import PollingNode
 from maglev_ros2cli import qos
-from maglev_ros2cli.errors import CommandError
 from maglev_ros2cli.graph import absolute, add_arguments, add_topic_name, graph, topics
 from maglev_ros2cli.messages import Form, as_csv, as_yaml, find_type
-from maglev_ros2cli.parser import Verbs
+from maglev_ros2cli.parser import CommandError, Verbs
 
 _TRUNCATE = 128
 _POLL = 0.01
@@ -22,31 +21,23 @@ _DEPTH = 1000
 
 
 def add(verbs: Verbs) -> None:
-    """Give the verb to its command."""
     verb = verbs.add('echo', echo, 'Output messages from a topic')
     add_arguments(verb)
     add_topic_name(verb, "Name of the ROS topic to listen to (e.g. '/chatter')")
     verb.add_argument('message_type', nargs='?', help="Type of the message ('std_msgs/msg/String')")
     qos.add_arguments(verb, 'sensor_data')
-    verb.add_argument('--csv', action='store_true', help='All values separated by commas')
+    verb.flag('--csv', help='All values separated by commas')
     verb.add_argument('--field', help="Echo a selected field; '.' for fields of fields")
-    verb.add_argument(
-        '-f', '--full-length', action='store_true', help='All elements of arrays and strings'
-    )
-    verb.add_argument(
-        '-l',
-        '--truncate-length',
-        type=count,
-        default=_TRUNCATE,
-        help=f'Length to truncate arrays, bytes and strings to (default: {_TRUNCATE})',
-    )
-    verb.add_argument('--no-arr', action='store_true', help="Don't print array fields")
-    verb.add_argument('--no-str', action='store_true', help="Don't print string fields")
-    verb.add_argument('--flow-style', action='store_true', help='Print in the block style or flow')
-    verb.add_argument('--no-lost-messages', action='store_true', help='As ever: none are reported')
-    verb.add_argument('--raw', action='store_true', help='Echo the raw binary representation')
+    verb.flag('-f', '--full-length', help='All elements of arrays and strings')
+    length = f'Length to truncate arrays, bytes and strings to (default: {_TRUNCATE})'
+    verb.add_argument('-l', '--truncate-length', type=count, default=_TRUNCATE, help=length)
+    verb.flag('--no-arr', help="Don't print array fields")
+    verb.flag('--no-str', help="Don't print string fields")
+    verb.flag('--flow-style', help='Print in the block style or flow')
+    verb.flag('--no-lost-messages', help='As ever: none are reported')
+    verb.flag('--raw', help='Echo the raw binary representation')
     verb.add_argument('--filter', metavar='EXPR', help="Only messages for which EXPR of 'm' holds")
-    verb.add_argument('--once', action='store_true', help='Print the first message, then exit')
+    verb.flag('--once', help='Print the first message, then exit')
     verb.add_argument('--timeout', metavar='N', type=not_negative, help='Exit after N seconds')
 
 

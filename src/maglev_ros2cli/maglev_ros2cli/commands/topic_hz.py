@@ -21,18 +21,12 @@ _POLL, _REPORT = 0.02, 1.0
 
 
 def add(verbs: Verbs) -> None:
-    """Give the verb to its command."""
     verb = verbs.add('hz', hz, 'Print the average receiving rate to screen')
     add_arguments(verb)
     add_topic_name(verb, "Name of the ROS topic to listen to (e.g. '/chatter')")
-    verb.add_argument(
-        '-w',
-        '--window',
-        type=whole_number(1),
-        default=_WINDOW,
-        help=f'window size, in # of messages, for calculating rate (default: {_WINDOW})',
-    )
-    verb.add_argument('--wall-time', action='store_true', help='As ever: wall time is what counts')
+    size = f'window size, in # of messages, for calculating rate (default: {_WINDOW})'
+    verb.add_argument('-w', '--window', type=whole_number(1), default=_WINDOW, help=size)
+    verb.flag('--wall-time', help='As ever: wall time is what counts')
     qos.add_arguments(verb, 'sensor_data')
 
 

@@ -7,55 +7,36 @@ from typing import Any
 
 from maglev_model.programs.arguments import count, not_negative, positive
 from maglev_ros2cli import qos
-from maglev_ros2cli.errors import CommandError
 from maglev_ros2cli.graph import absolute, add_arguments, add_topic_name, node
 from maglev_ros2cli.interfaces import names
 from maglev_ros2cli.messages import fill, find_type, values_of
-from maglev_ros2cli.parser import Verbs, complete
+from maglev_ros2cli.parser import CommandError, Verbs, complete
 
 _SAY_WAITING = 1.0
 
 
 def add(verbs: Verbs) -> None:
-    """Give the verb to its command."""
     verb = verbs.add('pub', pub, 'Publish a message to a topic')
     add_arguments(verb)
     add_topic_name(verb, "Name of the ROS topic to publish to (e.g. '/chatter')")
-    kind = verb.add_argument('message_type', help="Type of the message ('std_msgs/msg/String')")
+    add = verb.add_argument
+    kind = add('message_type', help="Type of the message ('std_msgs/msg/String')")
     complete(kind, lambda _: names('msg'))
-    verb.add_argument(
-        'values', nargs='?', default='{}', help="Values in YAML ('data: Hello World')"
-    )
-    verb.add_argument('-r', '--rate', metavar='N', type=positive, default=1.0, help='Rate in Hz')
-    verb.add_argument(
-        '-p', '--print', metavar='N', type=count, default=1, help='Only print every N-th message'
-    )
+    add('values', nargs='?', default='{}', help="Values in YAML ('data: Hello World')")
+    add('-r', '--rate', metavar='N', type=positive, default=1.0, help='Rate in Hz')
+    add('-p', '--print', metavar='N', type=count, default=1, help='Only print every N-th message')
     times = verb.add_mutually_exclusive_group()
     times.add_argument('-1', '--once', action='store_true', help='Publish one message and exit')
     times.add_argument(
         '-t', '--times', metavar='N', type=count, default=0, help='Publish N times and then exit'
     )
-    verb.add_argument(
-        '-w',
-        '--wait-matching-subscriptions',
-        metavar='N',
-        type=count,
-        help='Wait for N subscriptions first (default: 1 with --once or --times, otherwise 0)',
-    )
-    verb.add_argument(
-        '--max-wait-time-secs',
-        metavar='S',
-        type=not_negative,
-        help='Wait for them at most S seconds',
-    )
-    verb.add_argument(
-        '--keep-alive',
-        metavar='S',
-        type=not_negative,
-        default=0.1,
-        help='Stay for S seconds at the end',
-    )
-    verb.add_argument('-n', '--node-name', help='Name of the created publishing node')
+    first = 'Wait for N subscriptions first (default: 1 with --once or --times, otherwise 0)'
+    add('-w', '--wait-matching-subscriptions', metavar='N', type=count, help=first)
+    most = 'Wait for them at most S seconds'
+    add('--max-wait-time-secs', metavar='S', type=not_negative, help=most)
+    stay = 'Stay for S seconds at the end'
+    add('--keep-alive', metavar='S', type=not_negative, default=0.1, help=stay)
+    add('-n', '--node-name', help='Name of the created publishing node')
     qos.add_arguments(verb, 'default')
 
 
