@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from runner.console import talk_to
 from runner.folder import default_folder
 from runner.options import Option, folder
+from runner.overlays import overlay
 
 Job = Callable[[], int]
 """What returns an exit code; it may raise WrongUseError before anything is started."""
@@ -21,6 +23,12 @@ OUTPUT = {
 def out_option(what: str, name: str) -> Option:
     """Where ``what``, as ``the run is``, is left of the script ``name``."""
     return Option(f'where {what} left (default runs/{name}-<time>)', 'DIR', folder)
+
+
+def overlays(what: str, width: int = 82) -> Option:
+    """Parameter files of the user's own, in whose help a line is so wide."""
+    where = 'from the current folder or from params/; repeatable, the last one wins'
+    return Option(textwrap.fill(f'{what}, {where}', width), 'OVERLAY.yaml', overlay)
 
 
 def out_folder(name: str, given: Mapping[str, list[str]]) -> Path:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
-from runner.common_options import OUTPUT, Job, out_folder, out_option, talk
+from runner.common_options import OUTPUT, Job, out_folder, out_option, overlays, talk
 from runner.graph import VIEWS, Flight, Scenario, text_value
 from runner.options import (
     Command,
@@ -18,7 +18,7 @@ from runner.options import (
     one_of,
     seconds,
 )
-from runner.overlays import PARAMS, overlay
+from runner.overlays import PARAMS
 from runner.paper_tables import Wanted, fly_all
 from runner.run import fly
 from runner.signals import Signals
@@ -30,9 +30,7 @@ MODE = Option(
     one_of('lockstep', 'realtime'),
 )
 NAMESPACE = Option(
-    'where on the graph the nodes are: several runs, each in its own, fly at once',
-    'NS',
-    namespace,
+    'where on the graph the nodes are: several runs, each in its own, fly at once', 'NS', namespace
 )
 VIEW = {
     '--view': Option('show the flight live in the browser'),
@@ -51,12 +49,7 @@ def _flight_command(name: str, description: str, call: str = '') -> Command:
         '--duration': Option(
             'measured time: of the tracking window, or of each step [s]', 'S', seconds
         ),
-        '--params': Option(
-            "parameters on top of the scenario's, from the current folder or from\n"
-            'params/; repeatable, the last one wins',
-            'OVERLAY.yaml',
-            overlay,
-        ),
+        '--params': overlays("parameters on top of the scenario's", width=70),
         '--namespace': NAMESPACE,
         **VIEW,
         '--out': out_option('the run is', name),

@@ -12,17 +12,8 @@ from runner.options import WrongUseError
 
 ROOT = Path(__file__).resolve().parents[2]
 PARAMS = ROOT / 'params'
-SECTIONS = (
-    'plant',
-    'hw_bridge',
-    'controller',
-    'reference',
-    'monitor',
-    'recorder',
-    'view',
-    'web',
-    '**',
-)
+_NODES = ('plant', 'hw_bridge', 'controller', 'reference', 'monitor', 'recorder', 'view', 'web')
+SECTIONS = (*_NODES, '**')
 
 DISTRIBUTIONS = 'robustness'
 """The section of what machines are drawn from, which no node hears."""

@@ -279,7 +279,7 @@ def test_the_tuning_is_told_what_the_user_wants(tree: Tree) -> None:
     assert tree.finish(*options, '--params', 'soft', script='tune') == (1, '')
     params = tree.path / 'params'
     assert tree.history('tune') == [
-        f'--params {params} --out here --experiment hold scan --machines 9 --margin 5.5'
+        f'--params {params} --out here --machines 9 --margin 5.5 --experiment hold scan'
         f' --overlay {params}/soft.yaml'
     ]
 
