@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 from maglev_hw_bridge.emulation.parameters import EmulationParameters
 from maglev_hw_bridge.signal_parameters import (
@@ -195,7 +196,7 @@ class BridgeLandingParameters:
 class BridgeParameters:
     """The hardware bridge."""
 
-    sample_time: float = parameter(1e-3, 'time between samples', unit='s', within=(1e-3, 1e-2))
+    sample_time: float = parameter(1e-3, 'time between samples', unit='s', within=(1e-4, 1e-2))
     driver: str = parameter('emulated', 'which boards: quanser, emulated, or a driver of your own')
     machine: MachineParameters = group(MachineParameters)
     commutation: CommutationParameters = group(CommutationParameters)
@@ -231,6 +232,12 @@ class BridgeParameters:
                 f"parameter 'boards.stop_time' is {self.boards.stop_time:g} s, a landing takes "
                 f'{longest:g} s'
             )
+
+    @property
+    def kept_samples(self) -> int:
+        """Samples that a board keeps, so that its watchdog expires before any is lost."""
+        until_expiry = math.ceil(self.boards.watchdog / self.sample_time)
+        return max(self.boards.buffer, until_expiry)
 
     def check_homing(self) -> None:
         """Refuse a home that no platen rests at, and one at the start with real boards.

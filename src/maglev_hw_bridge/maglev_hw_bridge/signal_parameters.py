@@ -236,7 +236,10 @@ class BoardParameters:
         within=(0.002, 1.0),
     )
     buffer: int = parameter(
-        50, 'samples the board keeps for a bridge that is late', within=(2, 10_000)
+        50,
+        'samples the board keeps for a bridge that is late, at least those that come until its '
+        'watchdog expires',
+        within=(2, 10_000),
     )
     overrun: float = parameter(
         0.005, 'a sample that is read this late is a fault', unit='s', within=(0.001, 1.0)

@@ -7,6 +7,7 @@ latched until :meth:`reset`.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -59,7 +60,7 @@ class BridgeStage(StageLife):
         self._behind = 0  # samples that this one was late by
         self._to_catch_up = 0  # late samples still to come when the landing began
         self._lower_stop = self.parameters.machine.gap_max
-        self._stale_samples = round(self.parameters.fault.stale / self.sample_time)
+        self._stale_samples = math.ceil(self.parameters.fault.stale / self.sample_time - 1e-9)
         self._longest_stop = round(self.parameters.boards.stop_time / self.sample_time)
         self._landing_samples = 0
         self._named: set[tuple[int, ...]] = set()  # what the fault latched says of sensing
@@ -222,7 +223,10 @@ class BridgeStage(StageLife):
             return False
         place = self.guard.arrays.position[1:3]
         away = float(np.max(np.abs(place - self._parked_at)))
-        most = _SLIDING * self.sample_time if self.guard.arrays.samples > 1 else _PARKED
+        count = max(self.parameters.encoder.resolution[4:])
+        most = max(_SLIDING * self.sample_time, 1.5 * count)
+        if self.guard.arrays.samples <= 1:
+            most = _PARKED
         leapt = float(np.max(np.abs(place - self._was_at))) > most
         parked = self._parked_samples * self.sample_time >= _REST_TIME
         slid = parked and not leapt and away > _LEFT

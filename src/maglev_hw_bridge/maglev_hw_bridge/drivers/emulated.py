@@ -7,6 +7,7 @@ ask for patience.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 
@@ -88,7 +89,7 @@ class EmulatedBoards:
         self.lines = Lines(parameters)
         self.expired = np.zeros(2, dtype=bool)
         self._held = self.rig.counts()
-        self.past = np.zeros((parameters.boards.buffer + 2, 24))
+        self.past = np.zeros((parameters.kept_samples + 2, 24))
         self._delay = 0
         self._inject = parameters.emulation.inject
         wiring = parameters.emulation.wiring
@@ -189,7 +190,7 @@ class EmulatedBoards:
             self._sleep(seconds)
             self.catch_up()
             return
-        for _ in range(round(seconds / self.period)):
+        for _ in range(math.ceil(seconds / self.period - 1e-9)):
             self.tick()
 
     def dead(self, phase: int) -> None:

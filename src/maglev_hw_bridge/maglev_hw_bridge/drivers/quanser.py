@@ -103,7 +103,7 @@ class QuanserDriver:
                 board.arm(self._hardware.DigitalState)
             self._task = first.ask(
                 'task_create_encoder_reader',
-                self._parameters.boards.buffer,
+                self._parameters.kept_samples,
                 first.inputs,
                 len(first.inputs),
             )

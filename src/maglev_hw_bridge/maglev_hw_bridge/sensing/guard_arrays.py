@@ -36,7 +36,7 @@ class GuardArrays(ObserverArrays):
     at_once: Annotated[FloatArray, 6]  # 1 where an encoder is read at once, 0: at the tick
 
     trust: Annotated[NDArray[np.int8], 6]  # SOUND, PUT_RIGHT, LOST or NOISY
-    probation: Annotated[NDArray[np.int8], 6]  # samples that a slip is not followed yet
+    probation: Annotated[NDArray[np.int64], 6]  # samples that a slip is not followed yet
     offset: Annotated[FloatArray, 6]  # what an encoder reads too much [m]
     blamed: Annotated[NDArray[np.int8], 6]  # found wrong in this sample
     samples: int  # seen

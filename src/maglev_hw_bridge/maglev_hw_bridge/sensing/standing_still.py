@@ -71,6 +71,12 @@ def look(g: GuardArrays, flying: bool, counted: Flags) -> None:
 
 
 @borrowing
+def _reach(g: GuardArrays, i: int, speed: float) -> float:
+    """How far an encoder comes in a sample at a speed; a count may always be [m]."""
+    return float(max(g.period * speed, 1.5 * g.count[i]))
+
+
+@borrowing
 def await_lift_off(g: GuardArrays) -> None:
     g.answered[:], g.left[:] = int(not observer.supported(g, Y)), 0.0
 
@@ -89,7 +95,7 @@ def call_the_roll(g: GuardArrays, flying: bool, counted: Flags) -> bool:
     for i in range(4):
         step = g.believed[i] - g.past[0, i]
         g.answered[i] = max(g.answered[i], int(counted[i]))
-        g.left[i] = g.left[i] + step if abs(step) < g.period * _LEAP else 0.0
+        g.left[i] = g.left[i] + step if abs(step) < _reach(g, i, _LEAP) else 0.0
         called = called or (g.trust[i] == SOUND and abs(g.left[i]) > g.roll_call)
     found = False
     for i in range(4):
@@ -174,7 +180,7 @@ def listen(g: GuardArrays) -> None:
         if g.trust[4 + k] != LOST or g.stood[k] == 0 or step == 0.0:
             continue
         way = 1 if step > 0.0 else -1
-        if abs(step) > g.period * _FASTEST or way * g.heard[k] < 0:
+        if abs(step) > _reach(g, 4 + k, _FASTEST) or way * g.heard[k] < 0:
             g.heard[k] = 0
         g.heard[k] += way
         if abs(g.heard[k]) >= _HEARD:
