@@ -6,6 +6,7 @@ import json
 from collections import Counter
 from itertools import pairwise
 
+import numpy as np
 import pytest
 
 from maglev_hw_bridge.parameters import FaultParameters
@@ -60,7 +61,7 @@ def test_sizes_of_slips_are_1_to_50_counts_either_way() -> None:
 
 @pytest.mark.parametrize('number', [0, 1, 2, 3])
 def test_a_programme_has_all_phases_one_after_another(number: int) -> None:
-    course = programme(number, 0.031)
+    course = programme(number, 0.031, 1e-3)
     spans = [course.spans[phase] for phase in PHASES[2:]]
     assert all(start < end for start, end in spans)
     assert all(before[1] <= after[0] for before, after in pairwise(spans))
@@ -69,6 +70,17 @@ def test_a_programme_has_all_phases_one_after_another(number: int) -> None:
         start, end = course.spans[phase]
         assert course.sample_of(phase, 0.0) == start
         assert course.sample_of(phase, 0.999999) == max(end - 1, start)
+
+
+@pytest.mark.parametrize('period', [2.5e-4, 1.25e-3, 2e-3])
+def test_a_programme_takes_as_long_whatever_its_samples(period: float) -> None:
+    usual, course = programme(3, 0.031, 1e-3), programme(3, 0.031, period)
+    for phase in PHASES:
+        lasts = 1e-3 * np.array(usual.spans[phase])
+        np.testing.assert_allclose(period * np.array(course.spans[phase]), lasts, atol=period)
+    calm = 1e-3 * usual.spans['steps'][1] + 0.095
+    assert course.jumps(round(calm / period))
+    assert not course.jumps(round((calm + 0.01) / period))
 
 
 def test_any_machine_can_be_held_by_its_currents_wherever_it_flies() -> None:

@@ -56,7 +56,7 @@ def test_a_file_without_a_run_is_refused(
 @pytest.mark.parametrize(
     ('given', 'named'),
     [
-        ('sample_time: 0.0005', "'sample_time' is 0.0005"),
+        ('sample_time: 0.0005', "'sample_time' of the bridge is 0.0005"),
         ('machine: {gap_max: 0.030}', "'machine.gap_max' is 0.03"),
         ('machine: {mass_y: -7.0}', "'machine.mass_y' is -7"),
         ('fault: {jmup: 1.0}', "'fault.jmup'"),

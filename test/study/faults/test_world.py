@@ -56,11 +56,11 @@ def test_noise_stays_within_its_size(flight: Flight) -> None:
 def test_an_amplifier_that_is_stuck_on_ends_when_it_is_disabled(flight: Flight) -> None:
     world = flight.world
     world.stick_on(3, 4.0)
-    world.let_pass(20)
+    world.let_pass(0.02)
     rest = world.parameters.emulation.wiring.offset[3]
     assert world.rig.phase_current[3] == pytest.approx(4.0 - rest, abs=1e-3)
     flight.bridge.vanish()
-    world.let_pass(60)
+    world.let_pass(0.06)
     assert not world.enabled
     assert np.max(np.abs(world.rig.phase_current)) < 1e-6
 
@@ -70,7 +70,7 @@ def test_a_gain_scales_what_flows_in_its_phase_alone(flight: Flight, factor: flo
     world = flight.world
     volts = world.volts[world._outputs]
     world.scale_gain(0, factor)
-    world.let_pass(10)
+    world.let_pass(0.01)
     rest = np.array(world.parameters.emulation.wiring.offset)
     expected = volts - rest
     expected[0] *= factor

@@ -16,7 +16,7 @@ from maglev_study.faults.kinds import Fault
 PER_MACHINE = 60
 """Runs that one machine's programme is flown for."""
 
-_LATEST = 500  # of a second fault after the first [samples]
+_LATEST = 500  # of a second fault after the first [ms]
 
 
 @functools.cache

@@ -26,11 +26,11 @@ from maglev_study.faults.machines import PLAIN, Believed, machine
 from maglev_study.faults.programme import RESET, STOP, programme
 from maglev_study.faults.world import World
 
-_LONGEST_GAP = 20  # samples a controller misses before it gives up
+_LONGEST_GAP = 0.02  # a controller misses samples before it gives up [s]
 SESSION = 4711
 """Of the one controller there should be."""
 
-_POLL = 100  # samples from a look at the signals to the next
+_POLL = 0.1  # from a look at the signals to the next [s]
 
 
 class Answer(NamedTuple):
@@ -58,7 +58,7 @@ class Bridge:
         self.lost = False
         self._watch = ControllerWatch()
         self._signals = 0
-        self._looks = 0
+        self._looks, self._look_period = 0, round(_POLL / parameters.sample_time)
         self._rescued = False
         self._finally: Callable[[], None] | None = None  # when it has landed by itself
 
@@ -148,7 +148,7 @@ class Bridge:
     def sample(self, inbox: list[Answer]) -> EncoderSample | None:
         """One sample: read, then follow the newest currents; what is measured, where it was."""
         self._looks += 1
-        if self._signals and (not self.active or self._looks % _POLL == 0):
+        if self._signals and (not self.active or self._looks % self._look_period == 0):
             self._signals = 0
             self.end()
         if self._finally is not None and (self.lost or not self.stage.flying):
@@ -221,6 +221,7 @@ class Controller:
 
     def __init__(self, parameters: ControllerParameters) -> None:
         self.supervisor = Supervisor(parameters)
+        self._longest_gap = _LONGEST_GAP / parameters.sample_time
         self.alive = True
         self.stalled = False
         self.pace = 1.0  # samples answered per sample
@@ -266,7 +267,8 @@ class Controller:
         supervisor = self.supervisor
         if not self.heeded:
             return self._currents(sequence)
-        if self._sequence >= 0 and sequence - self._sequence > _LONGEST_GAP and supervisor.flying:
+        missing = self._sequence >= 0 and sequence - self._sequence > self._longest_gap
+        if missing and supervisor.flying:
             supervisor.stop('measurements are missing')
         self._sequence = sequence
         supervisor.step(supervisor.references.find(sequence), *sample)
@@ -290,7 +292,8 @@ class Flight:
 
     def __init__(self, number: int, believed: Believed = PLAIN) -> None:
         self.parameters = machine(number, believed)
-        self.course = programme(number, self.parameters.machine.gap_max)
+        self.period = self.parameters.sample_time
+        self.course = programme(number, self.parameters.machine.gap_max, self.period)
         self.world = World(self.parameters)
         self.bridge = Bridge(self.parameters, self.world)
         self.controller = Controller(believed.controller)
@@ -301,6 +304,10 @@ class Flight:
         self.forbidden = ''  # why the amplifiers must not be enabled
         self.asked: Fault | None = None  # the bridge's, by the programme's own emergency stop
         self.each: Callable[[], None] | None = None  # before each sample
+
+    def samples_in(self, time: float) -> int:
+        """How many samples take that time [s]."""
+        return round(time / self.period)
 
     def step(self) -> None:
         """One sample passes."""

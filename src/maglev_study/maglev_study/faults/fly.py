@@ -15,14 +15,15 @@ from maglev_study.faults.judge import Judge, Verdict
 from maglev_study.faults.kinds import CUT, Expected, Fault, Run
 from maglev_study.faults.programme import BEFORE_THE_FIRST_SAMPLE, ON_THE_GROUND
 
-_WATCHED = 1000  # samples without a finding, until the operator lands
-_ALOFT = 300  # of these in flight, where the run began on the ground
-_LONGEST_END = 4000  # from then on to the end
-_AFTERWARDS = 80
+_WATCHED = 1.0  # without a finding, until the operator lands [s]
+_ALOFT = 0.3  # of that in flight, where the run began on the ground [s]
+_UP_AGAIN = 0.9  # from the reset to flight [s]
+_LONGEST_END = 4.0  # from then on to the end [s]
+_AFTERWARDS = 0.08  # [s]
 _REST_SPEED = 1e-3  # [m/s]
-_LONGEST_FALL = 700
-_GRACE = 30  # samples, for what must be quiet within 25
-_INSIST = 20  # samples of currents that must not be followed
+_LONGEST_FALL = 0.7  # [s]
+_GRACE = 0.03  # for what must be quiet within 25 ms [s]
+_INSIST = 0.02  # of currents that must not be followed [s]
 
 
 class Scenario(NamedTuple):
@@ -61,7 +62,8 @@ class Course:
     def begin(self, elapsed: int) -> None:
         """Let those faults begin that are due."""
         for index, fault in enumerate(self.scenario.faults):
-            if not self.begun[index] and elapsed >= fault.delay:
+            delay = self.flight.samples_in(1e-3 * fault.delay)
+            if not self.begun[index] and elapsed >= delay:
                 self.begun[index] = True
                 KINDS[fault.kind].begin(self.run, fault)
                 self.flight.world.refresh()
@@ -113,18 +115,18 @@ class Course:
     def _watch(self) -> None:
         """Until it is over, by the fault or, where that is not found out, by the operator."""
         flight, start = self.flight, self.flight.samples
-        last = max(fault.delay for fault in self.scenario.faults)
-        until = start + last + _WATCHED
+        last = 1e-3 * max(fault.delay for fault in self.scenario.faults)
+        until = start + flight.samples_in(last + _WATCHED)
         if self.scenario.phase in ON_THE_GROUND:
             begin = flight.course.spans['lift-off'][1]
             if self.scenario.phase in ('after a fault', 'reset'):
-                begin = flight.course.spans['reset'][1] + 900
-            until = max(until, begin + _ALOFT)
+                begin = flight.course.spans['reset'][1] + flight.samples_in(_UP_AGAIN)
+            until = max(until, begin + flight.samples_in(_ALOFT))
         while not self._over():
             if flight.samples == until:
                 flight.acting = False
                 flight.bridge.deactivate()
-            if flight.samples > until + _LONGEST_END:
+            if flight.samples > until + flight.samples_in(_LONGEST_END):
                 self.judge.blame(6, 'the run does not come to an end')
                 return
             self.begin(flight.samples - start)
@@ -163,12 +165,12 @@ class Course:
 
     def _settle(self) -> None:
         """Go on until the platen rests, and for a while."""
-        state = self.flight.world.rig.stage.state
+        flight, state = self.flight, self.flight.world.rig.stage.state
         still = 0
-        for _ in range(_LONGEST_FALL):
+        for _ in range(flight.samples_in(_LONGEST_FALL)):
             self.step()
             still = still + 1 if abs(state[1]) < _REST_SPEED else 0
-            if still >= _AFTERWARDS:
+            if still >= flight.samples_in(_AFTERWARDS):
                 return
 
     def _insist(self) -> None:
@@ -178,15 +180,15 @@ class Course:
         flight.controller.alive = False
         if not bridge.alive or bridge.stage.fault is None:
             return
-        self._command(_INSIST)
+        self._command()
         flight.world.cure()
         flight.forbidden = ''
         self.judge.may_enable = bridge.reset()
-        self._command(_INSIST)
+        self._command()
 
-    def _command(self, samples: int) -> None:
+    def _command(self) -> None:
         flight = self.flight
-        for _ in range(samples):
+        for _ in range(flight.samples_in(_INSIST)):
             currents = np.full(4, 2.0)
             flight.inbox = [Answer(flight.bridge.sequence, currents, currents, Status.FLYING)]
             self.step()

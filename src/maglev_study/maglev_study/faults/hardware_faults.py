@@ -77,7 +77,7 @@ def encoders(name: str, which: str) -> Kind:
         stuck = fault.targets if name == 'stuck' else ()
         blame = blame_of(fault.targets)
         return Expected(
-            CUT if hopeless else DEGRADED, 10, blame, stuck=stuck, encoders=fault.targets
+            CUT if hopeless else DEGRADED, 0.01, blame, stuck=stuck, encoders=fault.targets
         )
 
     lost_unseen = name in ('slip', 'jump', 'reset') and which != 'a gap'
@@ -128,7 +128,7 @@ def calls(mode: str, names: Sequence[str], lasts: bool) -> Kind:
             if mode == 'wrong result':
                 return WRONG[fault.call](sound, arguments)
             if mode == 'hang':
-                flight.world.let_pass(int(fault.size))
+                flight.world.let_pass(1e-3 * fault.size)
                 return sound(*arguments)
             raise _error(mode)
 
@@ -144,7 +144,7 @@ def calls(mode: str, names: Sequence[str], lasts: bool) -> Kind:
             telling = fault.call == 'task_read_encoder'
             if fault.call == 'write_analog':
                 return Expected(UNHEARD, None, '')
-        return Expected(CUT, 3 if telling else None, '', aloft=True)
+        return Expected(CUT, 0.003 if telling else None, '', aloft=True)
 
     return Kind(f'call: {mode}', draw, begin, expected, weight=4)
 

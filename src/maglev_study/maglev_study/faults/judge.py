@@ -15,7 +15,6 @@ from maglev_model.axes import FloatArray
 from maglev_study.faults.flight import Flight
 from maglev_study.faults.hardware_faults import SHOWS
 from maglev_study.faults.kinds import CUT, DEGRADED, Expected
-from maglev_study.faults.programme import PERIOD
 
 RULES = {
     1: 'found out in time, or unobservable and bounded',
@@ -26,7 +25,7 @@ RULES = {
     6: 'no hang, no leak, and a restart works',
 }
 
-QUIET_AFTER = 25  # samples from a terminal state to when there is no output
+_QUIET_AFTER = 0.025  # from a terminal state to when there is no output [s]
 _QUIET = 1e-6  # [V]
 _FLYING = 1e-4  # above the lower stop [m]
 _OFF_COURSE = (1.5e-3, 3e-3, 3e-3)  # of y, x, z while nothing is found out [m]
@@ -34,11 +33,11 @@ _STILL = 5e-5  # what the others count at most while a fault is hidden [m]
 _HIDDEN = np.array([2e-3, 2e-3, 2e-3, 2e-3, 5e-3, 5e-3])
 """How far a stuck encoder is off the truth when forces alone must have told of it [m]."""
 _ROUNDING = 1e-9  # [m]
-_FALL = 600  # longest, without current [samples]
-_CUT_SAMPLES = 3
-_WATCHDOG = 20  # [samples]
+_FALL = 0.6  # longest, without current [s]
+_CUT = 0.003  # without output in flight [s]
+_PROMPT = 2  # samples that the promptest finding takes, however long they are
 _FORETOLD = re.compile(r'strikes the \w+ stop at about ([\d.]+) m/s')
-_LONGEST = 16_000
+_LONGEST = 16.0  # [s]
 
 
 class Verdict(NamedTuple):
@@ -69,11 +68,13 @@ class Judge:
         self.may_enable = False  # a reset has gone well, or the process was started again
         self.enable_counts = True  # the enable line does what the bridge tells it,
         self.output_counts = True  # and so do the outputs
-        self._state = np.zeros((_LONGEST, 10))
-        self._volts = np.zeros((_LONGEST, 16))
-        self._shift = np.zeros((_LONGEST, 6))  # what encoders read beside the truth [m]
-        self._course = np.full((_LONGEST, 3), np.nan)
-        self._enabled = np.zeros(_LONGEST, dtype=bool)
+        self._quiet_after = flight.samples_in(_QUIET_AFTER)
+        self._longest = longest = flight.samples_in(_LONGEST)
+        self._state = np.zeros((longest, 10))
+        self._volts = np.zeros((longest, 16))
+        self._shift = np.zeros((longest, 6))  # what encoders read beside the truth [m]
+        self._course = np.full((longest, 3), np.nan)
+        self._enabled = np.zeros(longest, dtype=bool)
         self._phase_channels = world._outputs[0] * 8 + world._outputs[1]
         self._n = 0
         world.rig.forget_impact()
@@ -85,7 +86,7 @@ class Judge:
     def _observe(self) -> None:
         self.look()  # homing takes many samples
         world, n = self.flight.world, self._n
-        if n >= _LONGEST:
+        if n >= self._longest:
             raise RuntimeError('the run does not end')
         self._state[n] = world.rig.stage.state
         self._volts[n] = world.volts.ravel()
@@ -150,15 +151,15 @@ class Judge:
         shift, enabled = self._shift[:n] - self.baseline, self._enabled[:n]
         return self._state[:n], self._volts[:n], shift, enabled.astype(float)
 
-    def marks(self, shows: list[int]) -> dict[str, int]:
-        """What happened at which sample of the log."""
+    def marks(self, shows: list[int]) -> dict[str, float]:
+        """What happened when in the log [ms]."""
         marks = {
             'shows': self._first_sign(shows),
             'found': self.seen,
             'over': self.ended,
             'process ended': self.released,
         }
-        return {name: at for name, at in marks.items() if at is not None}
+        return {name: 1e3 * self.flight.period * at for name, at in marks.items() if at is not None}
 
     # -- afterwards --------------------------------------------------------------------------------
 
@@ -181,7 +182,7 @@ class Judge:
             self.blame(5, f'blamed: {self.reason}')
         detection = None
         if self.seen is not None and first is not None:
-            detection = PERIOD * max(self.seen - first, 0)
+            detection = self.flight.period * max(self.seen - first, 0)
         flew = bool(np.any(self._state[:n, 0] < self._floor - _FLYING))
         ended = ('cut' if self._was_cut() else 'landed') if flew else 'on the ground'
         return Verdict(tuple(self.problems), impact, detection, ended, self.reason)
@@ -227,9 +228,10 @@ class Judge:
             return
         first = max(first, self.latched)
         after = (self._end if self.seen is None else self.seen) - first
-        if after > expected.seen and (self._aloft(first) or not expected.aloft):
+        most = max(self.flight.samples_in(expected.seen), _PROMPT)
+        if after > most and (self._aloft(first) or not expected.aloft):
             what = 'never found out' if self.seen is None else 'found out late'
-            self.blame(1, f'{what}: {after} samples after it showed')
+            self.blame(1, f'{what}: {1e3 * self.flight.period * after:g} ms after it showed')
 
     def _judge_course(self) -> None:
         """What is not found out must not carry the platen away."""
@@ -239,7 +241,7 @@ class Judge:
             astray = np.any(error > _OFF_COURSE, axis=1)
         if astray.any():
             at = int(np.argmax(astray))
-            if self.seen is None or self.seen > at + QUIET_AFTER:
+            if self.seen is None or self.seen > at + self._quiet_after:
                 worst = 1e3 * np.nanmax(error[: seen + 1], axis=0)
                 self.blame(1, f'unseen, and off course by {np.round(worst, 1)} mm in y, x, z')
 
@@ -253,7 +255,10 @@ class Judge:
             foretold = float(told.group(1))
         else:
             at = min(self._end if self.seen is None else self.seen, self._n - 1)
-            expired = min(at + _WATCHDOG, self._n - 1)  # by then a watchdog has cut
+            watchdog = self.flight.parameters.boards.watchdog
+            expired = min(
+                at + self.flight.samples_in(watchdog), self._n - 1
+            )  # by then a watchdog has cut
             foretold = max(self._fall_from(max(at - 1, 0)), self._fall_from(expired))
         most = max(DEGRADED, 1.15 * foretold + 0.03)
         if impact > most:
@@ -262,14 +267,14 @@ class Judge:
     def _judge_outputs(self) -> None:
         if self.ended is None:
             return
-        after = slice(self.ended + QUIET_AFTER, self._n)
+        after = slice(self.ended + self._quiet_after, self._n)
         error = self._output_error(after)
         if self.output_counts and error.size and error.max() > _QUIET:
             self.blame(3, f'output {error.max():.2f} V off no current after the end')
         released = self._n if self.released is None else self.released
         if self._enabled[after.start : released].any():
             self.blame(3, 'amplifiers enabled while a fault is latched')
-        if self._enabled[max(released + QUIET_AFTER, after.start) : self._n].any():
+        if self._enabled[max(released + self._quiet_after, after.start) : self._n].any():
             self.blame(3, 'amplifiers enabled after the process has ended')
 
     def _output_error(self, where: slice) -> FloatArray:
@@ -284,8 +289,9 @@ class Judge:
         n = self._n
         quiet = self._output_error(slice(0, n)) < _QUIET
         aloft = self._state[:n, 0] < self._floor - _FLYING
-        run = np.convolve(quiet & aloft, np.ones(_CUT_SAMPLES), 'valid')
-        return bool(np.any(run >= _CUT_SAMPLES))
+        samples = max(self.flight.samples_in(_CUT), 2)
+        run = np.convolve(quiet & aloft, np.ones(samples), 'valid')
+        return bool(np.any(run >= samples))
 
     def _across(self) -> float:
         """Greatest speed at which the platen met a stop along X or Z [m/s]."""
@@ -309,7 +315,7 @@ class Judge:
         rig.arrays.current[:] = 0.0
         rig.forget_impact()
         rest = np.array(self.flight.parameters.emulation.wiring.offset)
-        for _ in range(_FALL):
+        for _ in range(self.flight.samples_in(_FALL)):
             rig.advance(rest)
         speed = rig.impact
         rig.arrays.block[:], rig.stage.block[:] = saved

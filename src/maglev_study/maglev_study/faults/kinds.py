@@ -27,16 +27,16 @@ class Fault:
 
     kind: str
     targets: tuple[int, ...] = ()  # encoders, phases, or a board
-    size: float = 0.0  # tens of micrometres, samples, share: by kind
+    size: float = 0.0  # tens of micrometres, milliseconds, share: by kind
     call: str = ''  # of the vendor's module
-    delay: int = 0  # [samples]
+    delay: int = 0  # [ms]
 
 
 class Expected(NamedTuple):
     """What must come of a fault."""
 
     impact: float | None  # greatest [m/s], or CUT
-    seen: int | None  # samples from when it shows to when it is latched; None: need not be
+    seen: float | None  # from when it shows to when it is latched [s]; None: need not be
     blame: str  # what the reason must match, or ''
     aloft: bool = False  # seen only where the platen flies when it shows
     stuck: tuple[int, ...] = ()  # encoders that stand still from then on

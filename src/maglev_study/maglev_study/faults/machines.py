@@ -12,7 +12,7 @@ from maglev_controller.parameters import ControllerParameters
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_model.parameters import ParameterError, from_yaml, replace
 from maglev_plant.parameters import OffsetParameters
-from maglev_study.faults.programme import PERIOD, ROOM
+from maglev_study.faults.programme import ROOM
 
 STOP_INPUT = 0
 ENABLE_OUTPUT = 1
@@ -55,16 +55,16 @@ def believed(*files: Path) -> Believed:
     bridge = from_yaml(BridgeParameters, 'hw_bridge', *files)
     controller = from_yaml(ControllerParameters, 'controller', *files)
     _check_room(bridge)
+    if bridge.sample_time != controller.sample_time:
+        raise ParameterError(
+            f"parameter 'sample_time' of the bridge is {bridge.sample_time:g} s, the controller's"
+            f' is {controller.sample_time:g} s: they must be the same'
+        )
     late = {'input_delay': max(controller.input_delay, 1)}
     return Believed(bridge, replace(controller, late))
 
 
 def _check_room(bridge: BridgeParameters) -> None:
-    if bridge.sample_time != PERIOD:
-        raise ParameterError(
-            f"parameter 'sample_time' is {bridge.sample_time:g}: the programme that is flown has"
-            f' samples of {PERIOD:g} s'
-        )
     *gaps, x, z = bridge.encoder.resolution
     if len(set(gaps)) > 1 or x != z:
         raise ParameterError(

@@ -141,7 +141,7 @@ def _replay(run: Scenario, given: Believed, out: Path) -> tuple[int, dict[str, A
     verdict = record.verdict
     print(describe(run))
     for name, at in record.marks.items():
-        print(f'  {name}: {at} ms after the beginning')
+        print(f'  {name}: {at:g} ms after the beginning')
     print(f'  {verdict.ended}, {verdict.impact:.4f} m/s at a stop')
     print(f'  the bridge: {verdict.reason or "no fault"}')
     for rule, text in verdict.violations:

@@ -21,7 +21,7 @@ def controller(
     name: str,
     act: Begin,
     sizes: tuple[int, int] = (0, 0),
-    seen: int | None = None,
+    seen: float | None = None,
     *,
     shows: bool = True,
 ) -> Kind:
@@ -67,23 +67,25 @@ def slow(run: Run, fault: Fault) -> None:
 
 
 def stall(run: Run, fault: Fault) -> None:
-    controller, end = run.flight.controller, run.flight.samples + int(fault.size)
+    flight, controller = run.flight, run.flight.controller
+    end = flight.samples + flight.samples_in(1e-3 * fault.size)
     controller.stalled = True
 
     def each() -> None:
-        if run.flight.samples >= end:
+        if flight.samples >= end:
             controller.stalled = False
 
-    run.flight.each = each
+    flight.each = each
 
 
 def replay(run: Run, fault: Fault) -> None:
     """What was said up to a while ago is said over and over, with the numbers it had."""
     heard: list[Answer] = []
+    samples = run.flight.samples_in(1e-3 * fault.size)
 
     def twist(answer: Answer) -> list[Answer]:
         heard.append(answer)
-        return [heard[(len(heard) - 1) % int(fault.size)]]
+        return [heard[(len(heard) - 1) % samples]]
 
     run.flight.controller.twist = twist
 
@@ -111,7 +113,7 @@ def operator(
     impact: float | None = NOMINAL,
     blame: str = NOTHING,
     phases: tuple[str, ...] = PHASES,
-    seen: int | None = None,
+    seen: float | None = None,
 ) -> Kind:
     def begin(run: Run, fault: Fault) -> None:
         if seen is not None:
@@ -127,7 +129,7 @@ def stopped() -> Kind:
     return Kind(
         'bridge stopped',
         lambda rng: Fault('bridge stopped', (), float(rng.integers(1, 51))),
-        lambda run, fault: run.flight.world.delay(int(fault.size)),
+        lambda run, fault: run.flight.world.delay(run.flight.samples_in(1e-3 * fault.size)),
         lambda fault: Expected(NOMINAL if fault.size < 18 else CUT, None, 'late|watchdog'),
         SAMPLING,
     )

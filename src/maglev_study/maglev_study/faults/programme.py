@@ -12,9 +12,6 @@ from maglev_model.loop_parameters import REFERENCE_FREQUENCY
 from maglev_model.quintic import minimum_jerk
 from maglev_study.references import HOVER, References, ellipse_at, held, joined, shaped
 
-PERIOD = 1e-3
-"""Of the samples [s]."""
-
 PHASES = (
     'homing',
     'arming',
@@ -49,8 +46,8 @@ _HEIGHTS = (0.0186, 0.0305)  # of hovering [m]
 _THETA = 0.01  # amplitude of the ellipse [rad]
 _GROW = 0.8  # of the ellipse, and to shrink again [s]
 _FAR = 0.045  # [m]
-_CALM = 100  # after raw steps [samples]
-_THIRD = 500  # of a landing [samples]
+_CALM = 0.1  # after raw steps [s]
+_THIRD = 0.5  # of a landing [s]
 
 STOP, RESET = 'stop', 'reset'
 
@@ -63,6 +60,7 @@ class Programme:
     kind: tuple[int, ...]  # of Phase, by sample
     spans: Mapping[str, tuple[int, int]]  # first sample, and the first after it
     actions: Mapping[int, str]  # by sample
+    period: float  # of the samples [s]
 
     def sample_of(self, phase: str, instant: float) -> int:
         """The sample at a share 0..1 of a phase."""
@@ -72,11 +70,12 @@ class Programme:
     def jumps(self, sample: int) -> bool:
         """Whether the reference is one that nothing can follow closely."""
         start, end = self.spans['steps']
-        return start <= sample < end + _CALM
+        return start <= sample < end + round(_CALM / self.period)
 
 
 class _Maker:
-    def __init__(self, floor: float) -> None:
+    def __init__(self, floor: float, period: float) -> None:
+        self.period = period
         self.parts: list[References] = []
         self.kind: list[int] = []
         self.spans: dict[str, tuple[int, int]] = dict.fromkeys(BEFORE_THE_FIRST_SAMPLE, (0, 0))
@@ -92,28 +91,28 @@ class _Maker:
             self.spans[name] = (start, len(self.kind))
 
     def go(self, goal: np.ndarray, time: float, hold: float) -> References:
-        part = shaped(self.place, goal, time, hold, PERIOD)
+        part = shaped(self.place, goal, time, hold, self.period)
         self.place = goal
         return part
 
     def stay(self, place: np.ndarray, time: float) -> References:
         self.place = place
-        return held(place, time, PERIOD)
+        return held(place, time, self.period)
 
 
-def programme(number: int, floor: float) -> Programme:
+def programme(number: int, floor: float, period: float) -> Programme:
     """The programme of a machine; even ones are landed by the controller, odd by the bridge.
 
-    ``floor`` is the gap at its lower stop [m].
+    ``floor`` is the gap at its lower stop [m], ``period`` that of its samples [s].
     """
     rng = np.random.default_rng([104729, number])
-    make = _Maker(floor)
+    make = _Maker(floor, period)
     make.add(Phase.REST, make.stay(make.rest, 0.05), name='rest')
     make.add(Phase.LIFT_OFF, make.go(HOVER, 0.8, 0.1), name='lift-off')
     heights = [_at(y=y) for y in rng.uniform(*_HEIGHTS, 3)]
     make.add(Phase.HOLD, *(make.go(place, 0.4, 0.3) for place in heights), name='hover')
     make.add(Phase.HOLD, make.go(HOVER, 0.4, 0.05))
-    make.add(Phase.TRACK, _ellipse(1.4 * _GROW), name='ellipse')
+    make.add(Phase.TRACK, _ellipse(1.4 * _GROW, period), name='ellipse')
     make.add(Phase.STEP, *_steps(make, rng), name='steps')
     make.add(Phase.HOLD, make.go(HOVER, 0.6, 0.05))
     signs = rng.choice((-1.0, 1.0), 2)
@@ -128,17 +127,17 @@ def programme(number: int, floor: float) -> Programme:
     make.add(Phase.REST, make.stay(make.rest, 0.1))
     make.add(Phase.LIFT_OFF, make.go(HOVER, 0.8, 0.0))
     make.add(Phase.HOLD, make.go(_at(y=rng.uniform(0.02, 0.029), x=0.02), 0.6, 3.0))
-    return Programme(joined(*make.parts), tuple(make.kind), make.spans, actions)
+    return Programme(joined(*make.parts), tuple(make.kind), make.spans, actions, period)
 
 
 def _at(y: float = 0.025, x: float = 0.0, z: float = 0.0) -> np.ndarray:
     return np.array([y, x, z, 0.0, 0.0])
 
 
-def _ellipse(plateau: float) -> References:
+def _ellipse(plateau: float, period: float) -> References:
     """The paper's ellipse in 4DOF; grows from a point, and shrinks to it again."""
-    samples = np.arange(round((2.0 * _GROW + plateau) / PERIOD), dtype=np.float64)
-    time = PERIOD * samples[:, None]
+    samples = np.arange(round((2.0 * _GROW + plateau) / period), dtype=np.float64)
+    time = period * samples[:, None]
     place, speed, bend = ellipse_at(REFERENCE_FREQUENCY * time, _THETA)
     up, up_rate, up_bend = minimum_jerk(np.clip(time / _GROW, 0.0, 1.0))
     down, down_rate, down_bend = minimum_jerk(np.clip((time - _GROW - plateau) / _GROW, 0.0, 1.0))
@@ -173,9 +172,10 @@ def _end(make: _Maker, *, by_bridge: bool) -> dict[int, str]:
         make.add(Phase.LAND, make.go(make.rest, 1.5, 0.1))
         make.add(Phase.REST, make.stay(make.rest, 0.1))
         stop = len(make.kind) - 1
+    length = round(_THIRD / make.period)
     for third in range(3):
-        begin = start + third * _THIRD
-        make.spans[f'landing {third + 1}/3'] = (begin, begin + _THIRD)
+        begin = start + third * length
+        make.spans[f'landing {third + 1}/3'] = (begin, begin + length)
     make.add(Phase.REST, make.stay(make.rest, 0.1), name='after a fault')
     reset = len(make.kind)
     make.add(Phase.REST, make.stay(make.rest, 0.1), name='reset')

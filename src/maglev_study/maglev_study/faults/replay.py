@@ -27,23 +27,24 @@ class Record(NamedTuple):
     volts: FloatArray  # outputs of both boards (n, 16)
     shift: FloatArray  # what the encoders read beside the truth (n, 6) [m]
     enabled: FloatArray  # whether the amplifiers are (n,)
-    marks: dict[str, int]  # what happened at which sample
+    marks: dict[str, float]  # what happened when [ms]
+    period: float  # of the samples [s]
 
 
 def replay(run: Scenario, believed: Believed = PLAIN) -> Record:
     """Fly one run and keep its log."""
     ((_, outcome),) = fly_all([run], believed, work=_record)
     if isinstance(outcome, Verdict):  # it hung, or died
-        return Record(
-            run, outcome, np.zeros((0, 10)), np.zeros((0, 16)), np.zeros((0, 6)), np.zeros(0), {}
-        )
+        log = np.zeros((0, 10)), np.zeros((0, 16)), np.zeros((0, 6)), np.zeros(0)
+        return Record(run, outcome, *log, {}, believed.bridge.sample_time)
     return outcome
 
 
 def _record(flight: Flight, run: Scenario) -> Record:
     course = Course(flight, run)
     verdict = course.fly()
-    return Record(run, verdict, *course.judge.log(), course.judge.marks(course.shows))
+    judge = course.judge
+    return Record(run, verdict, *judge.log(), judge.marks(course.shows), flight.period)
 
 
 def draw(record: Record) -> str:
@@ -55,7 +56,7 @@ def draw(record: Record) -> str:
         f'{verdict.ended}, {verdict.impact:.4f} m/s at a stop',
         f'as the bridge says: {verdict.reason or "nothing"}',
     ]
-    facts += [f'{name} {at} ms after the beginning' for name, at in record.marks.items()]
+    facts += [f'{name} {at:g} ms after the beginning' for name, at in record.marks.items()]
     title = f'Run {record.run.seed}'
     broken = describe_violations(Outcome(record.run, verdict))
     parts = [
@@ -72,7 +73,7 @@ def _plot(record: Record):  # type: ignore[no-untyped-def]
 
     from maglev_monitor.report.drawing import STYLE, to_plot
 
-    time = np.arange(len(record.state), dtype=float)
+    time = 1e3 * record.period * np.arange(len(record.state))
     with plt.rc_context(STYLE):
         figure, rows = plt.subplots(5, 1, figsize=(9.0, 11.0), sharex=True)
         state = 1e3 * record.state
@@ -91,7 +92,7 @@ def _plot(record: Record):  # type: ignore[no-untyped-def]
                 panel.axvline(at, color=_MARKS.get(name, '#888888'), linewidth=0.8)
         rows[1].legend()
         rows[2].legend(ncols=3)
-        caption = 'Lines: ' + ', '.join(f'{name} at {at} ms' for name, at in record.marks.items())
+        caption = 'Lines: ' + ', '.join(f'{name} at {at:g} ms' for name, at in record.marks.items())
         return to_plot('The run', caption, figure)
 
 

@@ -151,9 +151,9 @@ class World(EmulatedBoards):
         """Whether the amplifiers' enable line says so."""
         return self.lines.enabled
 
-    def let_pass(self, samples: int) -> None:
-        """Time passes, with nobody calling."""
-        for _ in range(samples):
+    def let_pass(self, time: float) -> None:
+        """Time [s] passes, with nobody calling."""
+        for _ in range(round(time / self.period)):
             self.tick()
 
     def cure(self) -> None:
