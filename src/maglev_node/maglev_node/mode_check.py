@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any, Final
 
 _ALIKE: Final = 1000  # two steps of stamps that differ by no more than this are steady [ns]
-_APART: Final = 0.2  # share of our sample time; what is nearer may be a clock's steps
+_STEADY: Final = 5  # such pairs in a row are no chance
+_APART: Final = 0.05  # share of our sample time; what is nearer may be a clock's steps
 
 
 class StageCheck:
@@ -22,6 +23,7 @@ class StageCheck:
         self._mode, self._ours = mode, 1e9 * sample_time
         self._sequence = self._stamp = 0
         self._period = 0.0  # of the sample before [ns]
+        self._alike = 0  # steps in a row
 
     def conflict(self, measurement: Any) -> str:
         """Take a measurement; why they cannot, or ''."""
@@ -35,9 +37,11 @@ class StageCheck:
         if samples == 0:
             return ''
         period = (measurement.stamp - self._stamp) / samples
-        steady = abs(period - self._period) <= _ALIKE  # not with an activation, as time begins anew
+        alike = abs(period - self._period) <= _ALIKE  # not with an activation, as time begins anew
+        self._alike = self._alike + 1 if alike else 0
         self._sequence, self._stamp, self._period = measurement.sequence, measurement.stamp, period
-        if not steady or period <= 0.0 or abs(period - self._ours) <= _APART * self._ours:
+        steady, apart = self._alike >= _STEADY, abs(period - self._ours) > _APART * self._ours
+        if not steady or period <= 0.0 or not apart:
             return ''
         return (
             f"the stage samples every {1e-6 * period:.6g} ms, this node's 'sample_time' is"
