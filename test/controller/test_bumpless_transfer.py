@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from retuning import retuned
 
+from maglev_controller.bumpless_transfer import model_maps
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
 from maglev_model.parameters import ParameterError, build, read_yaml, replace
@@ -91,6 +92,18 @@ def test_w_does_not_jump_and_the_flight_goes_on(name: str) -> None:
             assert np.all(difference <= (0.02 if plant == 'ideal.yaml' else steps))
         off = np.abs(run(new, flying, rest).output - rest.position)
         assert off.max() < (2e-3 if name == 'no feed-forward' else error)
+
+
+def fewer_frequencies(period: float) -> np.ndarray:
+    """How y's internal model is carried over to one with fewer frequencies."""
+    old = build(ControllerParameters, {'sample_time': period})
+    new = replace(old, CHANGES['fewer frequencies'])
+    return model_maps(*(Regulator(each).arrays for each in (old, new)))[0]
+
+
+@pytest.mark.parametrize('period', [2.5e-4, 1.25e-3, 2e-3])
+def test_internal_models_are_compared_over_two_seconds_at_any_sample_time(period: float) -> None:
+    np.testing.assert_allclose(fewer_frequencies(period), fewer_frequencies(PERIOD), atol=0.02)
 
 
 def test_the_share_that_fades_is_gone_soon() -> None:

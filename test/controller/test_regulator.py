@@ -120,6 +120,16 @@ def test_a_jump_of_the_set_point_has_no_rate(name: str) -> None:
     assert bench.regulator.error[0] == pytest.approx(-0.003)
 
 
+@pytest.mark.parametrize('period', [2.5e-4, 1e-3, 3e-3])
+def test_a_reference_without_velocities_may_move_at_0_2_m_s(period: float) -> None:
+    for speed, jumps in ((0.19, False), (0.21, period >= 1e-3)):
+        bench = Bench(build(ControllerParameters, {'sample_time': period}))
+        for k in range(5):
+            x = speed * period * k
+            bench.step(x=x, position=HOVER + np.array([0.0, x, 0.0, 0.0, 0.0]))
+        assert bool(bench.regulator.arrays.axes['transition_duration'][1] > 0.0) == jumps
+
+
 def test_error_rate_of_a_smooth_reference_is_the_filtered_rate_of_the_error() -> None:
     """Position and reference through the same filter: their difference is that of e itself."""
     bench = Bench(build(ControllerParameters, {'rate_estimate': 'derivative'}))

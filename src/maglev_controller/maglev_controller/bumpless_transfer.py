@@ -19,8 +19,8 @@ ON_THE_GROUND: Final = ('sample_time', 'law', 'inverse', 'input_delay', 'machine
 
 ModelMaps = tuple[FloatArray, ...]
 
-_HORIZON = 400  # moments at which old and new internal model are compared
-_STRIDE = 5  # samples between them
+_HORIZON = 2.0  # over which old and new internal model are compared [s]
+_STRIDE = 0.005  # between the moments at which they are, at least a sample [s]
 
 
 def check_retuning(old: ControllerParameters, new: ControllerParameters) -> None:
@@ -121,8 +121,10 @@ def _model_map(old: ControlArrays, new: ControlArrays, axis: int) -> FloatArray:
 def _outputs(arrays: ControlArrays, axis: int) -> FloatArray:
     """What each state of an internal model, left to itself, adds to w at the moments compared."""
     transition, output = arrays.transition[axis], arrays.models['output'][axis]
-    stride = np.linalg.matrix_power(transition, _STRIDE)
-    rows = np.empty((_HORIZON, output.size))
+    period = float(arrays.settings['period'])
+    samples = max(1, round(_STRIDE / period))
+    stride = np.linalg.matrix_power(transition, samples)
+    rows = np.empty((round(_HORIZON / (samples * period)), output.size))
     for row in rows:
         row[:] = output
         output = output @ stride

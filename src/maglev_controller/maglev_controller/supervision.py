@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from maglev_controller.bumpless_transfer import ModelMaps, check_retuning
+from maglev_controller.design.margins import check_in_real_time
 from maglev_controller.design_process import DesignProcess
 from maglev_controller.following_error import FollowingWatch
 from maglev_controller.landing import Landing
@@ -42,7 +43,8 @@ class Supervisor:
     ) -> None:
         """With ``hurried`` the stage does not wait for an answer, so that a law can be late.
 
-        Raises ParameterError when the regulator cannot be designed, or the learning.
+        Raises ParameterError when the regulator cannot be designed, or the learning, and for
+        margins that such a stage does not leave.
         """
         self.parameters = parameters
         self.regulator = Regulator(parameters)
@@ -62,6 +64,8 @@ class Supervisor:
         self._may_lift_off = False  # a rest was seen since the enable, and since a flight's middle
         self._segment = -1
         self._hurried = hurried
+        if hurried:
+            check_in_real_time(parameters, self.regulator.designs)
         self._hurry()
         self._warm_up()
 

@@ -12,12 +12,13 @@ import pytest
 from scipy.optimize import brentq
 
 from maglev_controller.design.axis_design import controller_system, resting
-from maglev_controller.design.margins import check_margins, loop_margins
+from maglev_controller.design.margins import check_in_real_time, check_margins, loop_margins
 from maglev_controller.design.state_space import Mode, closed_loop, plant_system, response
 from maglev_controller.laws.output_regulator import design as design_axis
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
 from maglev_controller.step.estimation import DOUBT
+from maglev_controller.supervision import Supervisor
 from maglev_model.axes import AXES
 from maglev_model.parameters import ParameterError, build, read_yaml, replace
 
@@ -223,6 +224,20 @@ def test_what_falls_short_is_refused(overrides: dict[str, object], reason: str) 
             Regulator(parameters(**overrides, margins__override=True))
     else:
         Regulator(parameters(**overrides, margins__override=True))
+
+
+@pytest.mark.parametrize(
+    ('period', 'reason'),
+    [(1.25e-3, 'phase margin is 17.*phi'), (2e-3, 'phase margin is 7.*y'), (2.5e-3, 'unstable')],
+)
+def test_what_real_time_leaves_too_little_margin_of_is_refused(period: float, reason: str) -> None:
+    """A sample late, for which the design may count with it."""
+    chosen = build(ControllerParameters, {'sample_time': period})
+    with pytest.raises(ParameterError, match=f"'input_delay' is 0.*{period:g} s.*{reason}"):
+        Supervisor(chosen, hurried=True)
+    for taken in ({'input_delay': 1}, {'margins.override': True}, {'sample_time': 1e-3}):
+        other = replace(chosen, taken)
+        check_in_real_time(other, Regulator(other).designs)
 
 
 def test_what_is_too_ill_conditioned_is_refused() -> None:

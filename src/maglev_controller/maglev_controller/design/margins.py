@@ -205,9 +205,9 @@ def _friction(design: AxisDesign, period: float, delay: int, designed: int) -> f
 
 
 def all_margins(
-    parameters: ControllerParameters, designs: Sequence[AxisDesign]
+    parameters: ControllerParameters, designs: Sequence[AxisDesign], late: int = 0
 ) -> tuple[LoopMargins, ...]:
-    """The margins of all axes; of axes designed alike only once.
+    """The margins of all axes, of axes designed alike only once; with currents ``late`` [samples].
 
     Raises :class:`ParameterError` for a loop that double precision cannot hold.
     """
@@ -218,7 +218,7 @@ def all_margins(
         if key in known:
             continue
         try:
-            known[key] = _worst(parameters, design, modes)
+            known[key] = _worst(parameters, design, modes, late)
         except np.linalg.LinAlgError as error:
             raise ParameterError(
                 f'{axis}: the loop with these gains is too ill-conditioned for its margins '
@@ -228,12 +228,14 @@ def all_margins(
 
 
 def _worst(
-    parameters: ControllerParameters, design: AxisDesign, modes: tuple[Mode, ...]
+    parameters: ControllerParameters, design: AxisDesign, modes: tuple[Mode, ...], late: int
 ) -> LoopMargins:
     """The margins as they are at least, wherever the modes are."""
     delay, tolerance = parameters.input_delay, parameters.modes.tolerance
     each = [
-        loop_margins(design, parameters.sample_time, delay=delay, designed=delay, modes=variant)
+        loop_margins(
+            design, parameters.sample_time, delay=delay + late, designed=delay, modes=variant
+        )
         for variant in variants(modes, tolerance)
     ]
     worst = max(each, key=lambda margins: margins.spectral_radius)
@@ -302,6 +304,27 @@ def check_margins(parameters: ControllerParameters, margins: LoopMargins, axis: 
             'make the axis faster or its integrator slower (its integration or weight_model), or '
             "set 'internal_model.rest' to 'hold'"
         )
+
+
+def check_in_real_time(parameters: ControllerParameters, designs: Sequence[AxisDesign]) -> None:
+    """Refuse a loop that is short of the least margins where currents come a sample late.
+
+    As they do in real time, which a longer sample makes worse; an ``input_delay`` of 1 counts with
+    it. Raises :class:`ParameterError`, naming the axis and the figure.
+    """
+    if parameters.input_delay > 0 or parameters.margins.override:
+        return
+    late = all_margins(parameters, designs, late=1)
+    for axis, margins, table in zip(AXES, late, parameters.axes, strict=True):
+        short = _shortfall(parameters.margins, margins)
+        if not margins.spectral_radius < 1.0:
+            short = 'the loop is unstable'
+        if short and table.controlled:
+            raise ParameterError(
+                f"parameter 'input_delay' is 0, but in real time currents come a 'sample_time' "
+                f'({margins.period:g} s) late, and then {short} ({axis}): set it to 1, shorten the '
+                "sample time, or take it as it is with 'margins.override'"
+            )
 
 
 def _shortfall(least: MarginParameters, margins: LoopMargins) -> str:

@@ -43,7 +43,10 @@ from maglev_model.quintic import quintic_to_zero, transition_time
 
 JUMP: Final = 2e-4
 """A change of the reference within one sample that its velocity does not explain [m, rad] and that
-counts as a jump; a reference without velocities can still move at 0.2 m/s."""
+counts as a jump, where it is faster than UNTOLD as well."""
+
+UNTOLD: Final = 0.2
+"""A reference without velocities can still move so fast [m/s, rad/s]."""
 
 LARGEST_REFERENCE: Final = 1e6
 """Sum of all the reference's magnitudes beyond which it is refused, like one that is not finite."""
@@ -96,7 +99,7 @@ def _follow_jump(
         axis.transition_duration,
         axis.transition_elapsed,
     )
-    if settings.jump_time > 0.0 and abs(jump) > JUMP:
+    if settings.jump_time > 0.0 and abs(jump) > max(JUMP, UNTOLD * settings.period):
         position -= jump
         axis.transition_position = position
         axis.transition_velocity = velocity
