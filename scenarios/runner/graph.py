@@ -99,7 +99,7 @@ class Flight(NamedTuple):
         if node == 'reference':
             values += ['autostart:=true', 'exit_at_end:=false']
             if self.mode == 'realtime':
-                values.append('lead:=128')  # for when the machine holds it up
+                values.append('lead:=0.128')  # for when the machine holds it up
             values += self.scenario.reference
             if self.duration:
                 values.append(f'duration:={self.duration}')

@@ -11,12 +11,22 @@ from hypothesis import strategies as st
 
 import maglev_reference
 import maglev_reference.timeline
+from maglev_controller.reference_buffer import ReferenceBuffer
 from maglev_model.contract.phases import Phase
 from maglev_model.geometry import motor_gaps
-from maglev_model.parameters import SHARED_GROUPS, build, from_yaml, read_yaml, specs, to_yaml
+from maglev_model.parameters import (
+    SHARED_GROUPS,
+    ParameterError,
+    build,
+    from_yaml,
+    read_yaml,
+    specs,
+    to_yaml,
+)
 from maglev_reference.check import UnreachableError
 from maglev_reference.node import ReferenceNodeParameters
 from maglev_reference.parameters import ReferenceParameters
+from maglev_reference.run import samples_ahead
 from maglev_reference.timeline import Timeline
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -293,6 +303,22 @@ def test_it_lands_out_of_any_moment_of_a_fast_step(target):
         assert block.position[sample:, 0].min() > 0.018
         assert block.acceleration[sample:, 0].max() < 9.0  # less than the weight takes
         assert block.position[sample:, 0].max() < 0.0316
+
+
+@pytest.mark.parametrize(
+    ('lead', 'period', 'ahead'), [(0.064, 1e-3, 64), (0.064, 2.5e-4, 256), (0.064, 1.25e-3, 52)]
+)
+def test_how_far_ahead_it_is_published_is_a_time(lead, period, ahead):
+    assert samples_ahead(lead, period) == ahead
+    build(ReferenceNodeParameters, {'lead': lead, 'sample_time': period})
+
+
+def test_no_more_is_published_ahead_than_a_controller_holds():
+    most = {'sample_time': 2.5e-4, 'lead': 0.2}
+    ahead = samples_ahead(build(ReferenceNodeParameters, most).lead, 2.5e-4)
+    assert ahead < ReferenceBuffer().capacity
+    with pytest.raises(ParameterError, match=r"'lead' is 0\.2 s, it must be at most 0\.16"):
+        build(ReferenceNodeParameters, {**most, 'sample_time': 2e-4})
 
 
 def test_every_parameter_is_listed_with_its_default():

@@ -30,7 +30,7 @@ def test_the_nodes_get_their_parameters(tree: Tree) -> None:
             assert f'effective_parameters:="{tree.out}/params/{node}.yaml"' in tree.arguments(node)
     assert {'mode:=realtime', WATCHERS} <= set(tree.arguments('plant'))
     reference = tree.arguments('reference')
-    assert {'duration:=3.0', 'autostart:=true', WATCHERS, 'lead:=128'} <= set(reference)
+    assert {'duration:=3.0', 'autostart:=true', WATCHERS, 'lead:=0.128'} <= set(reference)
     watchers = tree.arguments('watchers')
     assert {
         *(f'monitor:output:="{tree.out}/metrics.json"', f'recorder:output:="{tree.out}/bag"'),

@@ -19,7 +19,7 @@ from maglev_model.contract.modes import Mode
 from maglev_model.contract.phases import Phase
 from maglev_model.contract.wire import KEPT
 from maglev_model.geometry import outputs_of_gaps
-from maglev_model.parameters import parameter
+from maglev_model.parameters import ParameterError, parameter
 from maglev_msgs.srv import Step
 from maglev_node.graph_guard import GraphGuard, Watchers
 from maglev_node.mode_check import StageCheck
@@ -37,10 +37,11 @@ from maglev_reference.accuracy import summary, warnings
 from maglev_reference.check import UnreachableError
 from maglev_reference.given_points import Point
 from maglev_reference.parameters import ReferenceParameters
-from maglev_reference.run import ReferenceRun
+from maglev_reference.run import ReferenceRun, samples_ahead
 from maglev_reference.timeline import Timeline
 
 _LOOK_PERIOD = 0.25  # between two looks at the graph while the stage is flown [s]
+_MOST_AHEAD = 800  # samples; a controller holds 1024
 _LONGEST_TRAJECTORY = 100_000  # [bytes], which are read in less time than is published ahead
 _REMINDER = 5.0  # between two lines about what is waited for [s]
 _SILENCE = 0.5  # without a measurement from which on it is said [s]
@@ -55,12 +56,8 @@ class ReferenceNodeParameters(SourceParameters, ReferenceParameters):
 
     autostart: bool = parameter(True, 'start by itself; false: by ~/lift_off', read_only=True)
     exit_at_end: bool = parameter(False, 'end the process when the run is over', read_only=True)
-    lead: int = parameter(
-        64,
-        'how far the reference is published ahead, at least',
-        unit='samples',
-        within=(1, 200),
-        read_only=True,
+    lead: float = parameter(
+        0.064, 'published ahead by so much, at least', unit='s', within=(0.001, 0.2), read_only=True
     )
     poll_period: float = parameter(
         0.004,
@@ -78,9 +75,18 @@ class ReferenceNodeParameters(SourceParameters, ReferenceParameters):
         read_only=True,
     )
 
+    def __post_init__(self) -> None:
+        """Refuse more samples ahead than a controller holds."""
+        super().__post_init__()
+        most = _MOST_AHEAD * self.sample_time
+        if self.lead > most:
+            raise ParameterError(
+                f"parameter 'lead' is {self.lead:g} s, it must be at most {most:g}"
+            )
+
 
 class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
-    """Publishes ``reference`` ``lead`` samples ahead of the newest measurement.
+    """Publishes ``reference`` by ``lead`` ahead of the newest measurement.
 
     It looks at the newest measurement on a short timer instead of being woken by each one. The
     first measurement seen once all watchers are there tells where the platen rests and becomes
@@ -106,7 +112,8 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
             self.get_logger().info(line)
         self._graph = GraphGuard(self, lambda: not self._run.grounded)
         self._graph.claim(REFERENCE, 'reference')
-        lead = self.parameters.lead + PROGRESS_PERIOD - 1  # of the newest that may be heard of
+        lead = samples_ahead(self.parameters.lead, self.parameters.sample_time)
+        lead += PROGRESS_PERIOD - 1  # of the newest that may be heard of
         self._run = ReferenceRun(self.parameters, lead, self.parameters.autostart)
         self._watchers = Watchers(self, self.parameters.watchers, REFERENCE)
         self._seen = self._reminded = self._looked = time.monotonic()

@@ -7,6 +7,7 @@ leaves its run when the controller does not follow, or lands by itself. After th
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -29,6 +30,11 @@ _OBSTACLES = {
     Mode.FAULT: ('the controller is in a fault', ('reset', 'enable')),
     Mode.LANDING: ('the controller lands by itself', ('enable',)),
 }
+
+
+def samples_ahead(time: float, period: float) -> int:
+    """Samples of a ``period`` that reach a ``time`` ahead [s]."""
+    return math.ceil(time / period - 1e-9)
 
 
 class ReferenceRun:
