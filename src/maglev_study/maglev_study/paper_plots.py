@@ -126,7 +126,7 @@ def _step_curves(
 ) -> None:
     name, colour = style
     source, index = analysis.result['error_source'], AXES.index(axis)
-    time = (curves.sequence - curves.sequence[0]) * analysis.run.metrics.sample_time
+    time = (curves.sequence - curves.sequence[0]) * analysis.run.sample_time
     reference = 1e3 * curves.first[:, column('reference', index)]
     left.plot(time, reference, color=REFERENCE, lw=0.9, ls='--')
     envelope(left, time, curves, column(source, index), 1e3, colour, name)
@@ -166,7 +166,7 @@ def _tracking_figure(
 def _tail(analysis: Analysis, name: str, axis: str) -> tuple[FloatArray, FloatArray]:
     """Time [s] and one column of the last tracking samples."""
     sequence, values = analysis.curves.tail
-    time = (sequence - sequence[0]) * analysis.run.metrics.sample_time
+    time = (sequence - sequence[0]) * analysis.run.sample_time
     return time, values[:, column(name, AXES.index(axis))]
 
 

@@ -46,7 +46,7 @@ def replay(analysis: Analysis) -> str:
     currents = np.hypot(
         whole.first[:, COLUMNS['direct_current']], whole.first[:, COLUMNS['quadrature_current']]
     )
-    step = whole.width * run.metrics.sample_time
+    step = whole.width * run.sample_time
     server = serve('127.0.0.1', 0)
     try:
         scene = StageScene(server.scene, run.machine)

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from maglev_model.contract.phases import Phase
+from maglev_model.parameters import build
 from maglev_monitor.metrics.curves import COLUMNS, RunCurves
 from maglev_monitor.metrics.decoding import decode
 from maglev_monitor.metrics.envelope import Envelope
@@ -75,6 +76,14 @@ def test_run_curves(run: Any, messages: dict[str, list[bytes]]) -> None:
     assert [step.target[0] for step in curves.steps] == [0.027, 0.027]
     assert [step.target[4] for step in curves.steps] == [0.0, 0.01]
     assert [len(step.sequence) for step in curves.steps] == [300, 240]
+    short = RunCurves(build(RunParameters, {'sample_time': 0.1}))
+    joiner = Joiner()
+    for key, part in messages.items():
+        joiner.add(key, decode(key, part))
+    metrics = RunMetrics(RunParameters())
+    for block in joiner.finish():
+        short.add(metrics.add(block))
     sequence, values = curves.tail
+    np.testing.assert_array_equal(short.tail[0], sequence[-30:])
     np.testing.assert_array_equal(sequence, np.flatnonzero(run.phase == Phase.TRACK))
     np.testing.assert_array_equal(values[:, COLUMNS['reference']], run.reference[sequence])

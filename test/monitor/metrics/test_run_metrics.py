@@ -323,9 +323,9 @@ def test_kept_limits_pass_the_run(records: dict[str, Records]) -> None:
 def test_a_monitor_that_knows_another_sample_time_than_the_stage_fails_the_run(
     records: dict[str, Records],
 ) -> None:
-    found = figures(records, build(RunParameters, {'metrics.sample_time': 2e-3}), burst=70)
+    found = figures(records, build(RunParameters, {'sample_time': 2e-3}), burst=70)
     (reason,) = found['reasons']
-    assert reason.startswith('the stage samples every 1 ms, but metrics.sample_time is 2 ms')
+    assert reason.startswith('the stage samples every 1 ms, but sample_time is 2 ms')
     assert found['verdict'] == 'fail'
     assert figures(records)['verdict'] == 'pass'
 

@@ -11,13 +11,13 @@ from run_figures import figures
 
 from maglev_model.parameters import build
 from maglev_monitor.metrics.decoding import Records
-from maglev_monitor.metrics.run_parameters import MetricsParameters
+from maglev_monitor.metrics.run_parameters import RunParameters
 from maglev_monitor.metrics.step_response import StepTracker
 
 
 def step_result(position: Any, start: float, target: float, sample_time: float = 1e-3) -> Any:
     """The tracker's figures for a response of y, other axes at zero."""
-    parameters = build(MetricsParameters, {'sample_time': sample_time})
+    parameters = build(RunParameters, {'sample_time': sample_time})
     from_, to = np.zeros(5), np.zeros(5)
     from_[0], to[0] = start, target
     tracker = StepTracker(parameters, from_, to, 100)

@@ -22,7 +22,7 @@ def followed(frequency: float = ELLIPSE.frequency, tilt: float = 0.0, gap: float
     values = np.zeros((len(angle), max(part.stop for part in COLUMNS.values())))
     y = gap + 0.005 * np.sin(angle - 0.5 * np.pi)
     values[:, COLUMNS['reference']] = np.stack([y, x, z, 0 * x, tilt * np.sin(angle)], axis=1)
-    run = SimpleNamespace(metrics=SimpleNamespace(sample_time=PERIOD))
+    run = SimpleNamespace(sample_time=PERIOD)
     return SimpleNamespace(
         curves=SimpleNamespace(tail=(np.arange(4000, 4700), values)), run=run, result={}
     )

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from made_up_run import TOPICS, open_bag, write_samples
 
+from maglev_model.parameters import build
 from maglev_monitor.bag.analysis import analyse
 from maglev_monitor.metrics import curves
 from maglev_monitor.metrics.curves import COLUMNS
@@ -42,13 +43,15 @@ def test_every_step_stands_beside_its_own_figures(
     assert chart.caption.startswith('Each of the first 1 of 2 steps of an axis')
 
 
-def test_the_spectrum_s_integral_is_the_variance_of_what_its_caption_names() -> None:
+@pytest.mark.parametrize('period', [2.5e-4, 1e-3])
+def test_the_spectrum_s_integral_is_the_variance_of_what_its_caption_names(period: float) -> None:
     """A sine of 50 Hz and 1 µm counts, a drift of 30 µm does not."""
-    values = np.zeros((3000, COLUMNS['saturated'].stop))
-    time = 1e-3 * np.arange(len(values))
+    values = np.zeros((round(3.0 / period), COLUMNS['saturated'].stop))
+    time = period * np.arange(len(values))
     error = 1e-6 * (np.sin(100.0 * np.pi * time) + 30.0 * np.sin(0.2 * np.pi * time))
     values[:, COLUMNS['true_error'].start] = error
-    run, result = RunParameters(), {'error_source': 'true'}
+    run = build(RunParameters, {'sample_time': period})
+    result = {'error_source': 'true'}
     shown = SimpleNamespace(tail=(np.arange(len(values)), values))
     chart: Any = spectrum(SimpleNamespace(run=run, result=result, curves=shown))  # type: ignore[arg-type]
     density = chart.panels[0].renderers[0].data_source.data

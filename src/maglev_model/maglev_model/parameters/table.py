@@ -16,7 +16,7 @@ import re
 import sys
 import typing
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
 T = TypeVar('T')
 
@@ -25,6 +25,9 @@ SHARED_GROUPS = ('machine', 'guide', 'effects', 'internal_model', 'y', 'x', 'z',
 
 A node that has no such group leaves it to the others; one that has it refuses what is wrong in it.
 """
+
+SHARED: Final = ('sample_time',)
+"""Single parameters of all nodes, likewise."""
 
 _METADATA_KEY = 'maglev_parameter'
 _SCALARS: dict[type, str] = {bool: 'bool', int: 'integer', float: 'double', str: 'string'}
@@ -227,7 +230,9 @@ def replace(instance: T, overrides: Mapping[str, object]) -> T:
 
 
 def for_others(name: str, known: Iterable[str]) -> bool:
-    """Whether a parameter is of a shared group that a table with these names has nothing of."""
+    """Whether a parameter is shared, or of a shared group, and these names have nothing of it."""
+    if name in SHARED:
+        return name not in known
     group_name, dot, _ = name.partition('.')
     return (
         bool(dot)

@@ -126,5 +126,4 @@ def run_parameters(bag: Bag) -> tuple[RunParameters, list[str]]:
                         f'limits and parameters of the run are lost, defaults stand in: {error}'
                     ]
     run = RunParameters()
-    metrics = dataclasses.replace(run.metrics, sample_time=period or run.metrics.sample_time)
-    return dataclasses.replace(run, metrics=metrics), notes
+    return dataclasses.replace(run, sample_time=period or run.sample_time), notes

@@ -17,7 +17,7 @@ class Progress:
     """Stage time, real-time factor, phase and mean |e| of the newest block."""
 
     def __init__(self, run: RunParameters) -> None:
-        self._sample_time, self._radius = run.metrics.sample_time, run.machine.radius
+        self._sample_time, self._radius = run.sample_time, run.machine.radius
         self._latest: Records | None = None
         self._before: tuple[int, float] | None = None
         self._values: dict[str, object] = {}

@@ -31,7 +31,7 @@ otherwise; ``phase_current`` is the largest magnitude among a motor's three phas
 wall-clock time since the sample before [s]."""
 
 _DRAWN = ('true', 'measured')
-_TAIL = 3000  # tracking samples kept one by one
+_TAIL = 3.0  # of tracking whose samples are kept one by one [s]
 _MOST_STEPS = 40
 _STEP_BINS = 1200
 
@@ -58,6 +58,7 @@ class RunCurves:
         self.begun: int | None = None
         """When the first sample was measured, by the wall clock since the epoch [ns]."""
         self._machine = run.machine
+        self._tail = round(_TAIL / run.sample_time)  # [samples]
         self._tail_parts: list[tuple[NDArray[np.int64], FloatArray]] = []
         self._segment: int | None = None
         self._target: FloatArray | None = None
@@ -84,7 +85,7 @@ class RunCurves:
             return np.zeros(0, np.int64), np.zeros((0, _width()))
         sequence = np.concatenate([part[0] for part in self._tail_parts])
         values = np.concatenate([part[1] for part in self._tail_parts])
-        return sequence[-_TAIL:], values[-_TAIL:]
+        return sequence[-self._tail :], values[-self._tail :]
 
     def _values(self, rows: Records) -> FloatArray:
         values = np.full((len(rows), _width()), np.nan)
@@ -127,7 +128,7 @@ class RunCurves:
         tracked = rows['has_reference'] & (rows['phase'] == Phase.TRACK)
         if tracked.any():
             self._tail_parts.append((rows['sequence'][tracked], values[tracked]))
-            while sum(len(part[0]) for part in self._tail_parts[1:]) >= _TAIL:
+            while sum(len(part[0]) for part in self._tail_parts[1:]) >= self._tail:
                 del self._tail_parts[0]
 
     def _add_segment(self, rows: Records, values: FloatArray) -> None:

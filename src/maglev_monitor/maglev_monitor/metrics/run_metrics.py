@@ -52,7 +52,7 @@ class RunMetrics:
         self._holes = {key: Holes() for key in TOPIC_TYPES}
         self._last = dict.fromkeys(TOPIC_TYPES, -1)  # number of the last sample with one
         self._tracking = _Tracking()
-        self._arrivals = Arrivals(run.metrics.sample_time)
+        self._arrivals = Arrivals(run.sample_time)
         self._has_own = False  # whether the stage tells what its encoders' own scales have
         self._measured_samples = 0
         self._steps: list[StepTracker] = []
@@ -63,7 +63,7 @@ class RunMetrics:
         self._further = Further(run)
         self._timing = _Timing()
         self._following = Following()
-        self._faults = Faults(run.metrics.sample_time)
+        self._faults = Faults(run.sample_time)
         self._end: Instant | None = None
 
     @property
@@ -119,7 +119,7 @@ class RunMetrics:
         :param cut_off: whether what was still to come may have been written no more.
         """
         run, source = self._run, _TRUE if self._seen['plant'] else _MEASURED
-        sample_time = run.metrics.sample_time
+        sample_time = run.sample_time
         figures: dict[str, Any] = {
             'scenario': run.scenario,
             'stage': run.stage,
@@ -223,7 +223,7 @@ class RunMetrics:
         self._target = target
         self._step = None
         if row['phase'] == Phase.STEP and start is not None and (target != start).any():
-            self._step = StepTracker(self._run.metrics, start, target, int(row['sequence']))
+            self._step = StepTracker(self._run, start, target, int(row['sequence']))
             self._steps.append(self._step)
 
 

@@ -18,6 +18,7 @@ FAULT_LEVEL = 2
 _FORMER_NAMES = {
     'metrics.radius': 'machine.radius',
     'metrics.pole_pitch': 'machine.pole_pitch',
+    'metrics.sample_time': 'sample_time',
 }
 
 NOT_CHECKED = -1.0
@@ -42,9 +43,6 @@ def _axis_limits(description: str) -> Any:
 class MetricsParameters:
     """How the metrics are computed."""
 
-    sample_time: float = parameter(
-        1e-3, 'stage time from sample to sample', unit='s', within=(1e-5, 1.0)
-    )
     peak_current: float = parameter(
         7.0, "the amplifiers' peak, for the report", unit='A', within=(0.0, 100.0)
     )
@@ -101,6 +99,9 @@ class RunParameters:
     scenario: str = parameter('', 'name of the scenario, for the metrics')
     stage: str = parameter('', 'the stage that runs: plant or hw_bridge')
     mode: str = parameter('', 'lockstep or realtime')
+    sample_time: float = parameter(
+        1e-3, 'stage time from sample to sample', unit='s', within=(1e-5, 1.0)
+    )
     machine: MachineParameters = group(MachineParameters)
     metrics: MetricsParameters = group(MetricsParameters)
     limits: RunLimits = group(RunLimits)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from maglev_model.axes import AXES, FloatArray
 from maglev_monitor.metrics.derived import SOURCES
-from maglev_monitor.metrics.run_parameters import MetricsParameters
+from maglev_monitor.metrics.run_parameters import RunParameters
 
 _ROUNDING = 1e-12  # a whole count of error is within a bound of one count [m, rad]
 
@@ -26,9 +26,9 @@ class StepTracker:
     """
 
     def __init__(
-        self, settings: MetricsParameters, start: FloatArray, target: FloatArray, first: int
+        self, run: RunParameters, start: FloatArray, target: FloatArray, first: int
     ) -> None:
-        self._sample_time = settings.sample_time
+        settings, self._sample_time = run.metrics, run.sample_time
         self._start = start.copy()
         self._target = target.copy()
         self._bounds = np.array([settings.settling_bound, settings.encoder_bound]) + _ROUNDING

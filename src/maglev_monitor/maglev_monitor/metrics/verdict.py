@@ -109,10 +109,10 @@ def _step_reasons(figures: Mapping[str, Any], limits: RunLimits) -> Iterator[str
 
 def _sample_time_reason(figures: Mapping[str, Any], run: RunParameters) -> Iterator[str]:
     """Each figure in seconds is wrong where the monitor has not been told how the stage samples."""
-    stage, told = figures['timing']['sample_time'], run.metrics.sample_time
+    stage, told = figures['timing']['sample_time'], run.sample_time
     if stage is not None and abs(stage - told) > _NANOSECOND:
         yield (
-            f'the stage samples every {number(1e3 * stage)} ms, but metrics.sample_time is'
+            f'the stage samples every {number(1e3 * stage)} ms, but sample_time is'
             f' {number(1e3 * told)} ms: all times here are by the latter'
         )
 

@@ -19,16 +19,17 @@ from maglev_monitor.report.chart import (
 )
 from maglev_monitor.report.scales import MOVES, units
 
-_WINDOW = 1024  # samples in a segment of the spectrum
-_LEAST_TAIL = 512  # samples of tracking that give a spectrum
+_WINDOW = 1.024  # a segment of the spectrum [s]
+_LEAST_TAIL = 0.512  # of tracking that gives a spectrum [s]
 
 
 def spectrum(analysis: Analysis) -> Chart | None:
     """Amplitude spectral density of each error (Welch's method), or None when tracking is short."""
     sequence, values = analysis.curves.tail
-    if len(sequence) < _LEAST_TAIL:
+    source, rate = analysis.result['error_source'], 1.0 / analysis.run.sample_time
+    window, least = round(_WINDOW * rate), round(_LEAST_TAIL * rate)
+    if len(sequence) < least:
         return None
-    source, rate = analysis.result['error_source'], 1.0 / analysis.run.metrics.sample_time
     panels = Panels('frequency [Hz]', x_axis_type='log', y_axis_type='log', height=300)
     drawn = []
     for axes, unit in (((0, 1, 2), 'µm'), ((3, 4), 'µrad')):
@@ -36,9 +37,9 @@ def spectrum(analysis: Analysis) -> Chart | None:
         for colour, index in zip(COLOURS, axes, strict=False):
             error = 1e6 * values[:, column(f'{source}_error', index).place]
             error = error[np.isfinite(error)]
-            if len(error) < _LEAST_TAIL or np.ptp(error) == 0.0:
+            if len(error) < least or np.ptp(error) == 0.0:
                 continue
-            frequency, power = signal.welch(error, rate, nperseg=min(_WINDOW, len(error)))
+            frequency, power = signal.welch(error, rate, nperseg=min(window, len(error)))
             line(panel, frequency[1:], np.sqrt(power[1:]), AXES[index], colour)
         if panel.renderers:
             legend(panel)
@@ -48,7 +49,7 @@ def spectrum(analysis: Analysis) -> Chart | None:
     caption = (
         'Amplitude spectral density of the errors over the samples of the figure above: integrated '
         'over the frequency, its square is the variance of what is faster than '
-        f'{rate / _WINDOW:.2g} Hz.'
+        f'{1.0 / _WINDOW:.2g} Hz.'
     )
     return Chart('Spectrum of the errors', caption, drawn)
 
@@ -62,7 +63,7 @@ def reversals(analysis: Analysis) -> Chart | None:
         if len(sequence) < 2 or np.ptp(wanted) < MOVES:
             continue
         milli, micro = units(axis)
-        velocity = np.gradient(wanted, analysis.run.metrics.sample_time)
+        velocity = np.gradient(wanted, analysis.run.sample_time)
         panel = Panels(f'velocity of the reference [{milli}/s]').panel(axis, f'e [{micro}]')
         error = 1e6 * values[:, column(f'{source}_error', index).place]
         line(panel, 1e3 * velocity, error, 'e', ERROR, line_width=0.8)

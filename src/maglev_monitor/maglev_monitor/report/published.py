@@ -24,7 +24,7 @@ def published_tracking(analysis: Analysis) -> PublishedTracking | None:
     if len(sequence) < 2 or not np.isfinite(reference).all():
         return None
     x, z, theta = reference[:, X], reference[:, Z], reference[:, THETA]
-    time = np.diff(sequence) * analysis.run.metrics.sample_time
+    time = np.diff(sequence) * analysis.run.sample_time
     chord = 2.0 * ELLIPSE.radius * np.sin(0.5 * ELLIPSE.frequency * time)
     way = np.hypot(np.diff(x), np.diff(z))
     shape = (

@@ -93,7 +93,7 @@ def _tracking(analysis: Analysis) -> Chart | None:
         level(right, 0.0, dash='solid')
         drawn += [left, right]
     _name_once(drawn)
-    span = (int(sequence[-1]) - int(sequence[0]) + 1) * analysis.run.metrics.sample_time
+    span = (int(sequence[-1]) - int(sequence[0]) + 1) * analysis.run.sample_time
     caption = (
         f'The last {span:.1f} s of tracking, every sample (as Figs. 7, 8 of the paper). Mean |e| '
         'is that over the whole window.'
@@ -153,14 +153,15 @@ def _steps(analysis: Analysis) -> Chart | None:
 def _step_panels(
     analysis: Analysis, index: int, steps: list[tuple[StepCurves, dict[str, Any] | None]]
 ) -> list[Any]:
-    axis, source, settings = AXES[index], analysis.result['error_source'], analysis.run.metrics
+    axis, source = AXES[index], analysis.result['error_source']
+    period, settings = analysis.run.sample_time, analysis.run.metrics
     milli, micro = units(axis)
     panels = Panels('time since the step [s]')
     left = panels.panel(TITLES[axis], f'{axis} [{milli}]')
     right = panels.panel(f'error of {axis}', f'|e| [{micro}]', y_axis_type='log')
     for number, (step, found) in enumerate(steps):
         colour = COLOURS[number % len(COLOURS)]
-        time = (step.sequence - step.sequence[0]) * settings.sample_time
+        time = (step.sequence - step.sequence[0]) * period
         envelope(left, time, step, column(source, index, 1e3), _step_name(step, index), colour)
         wanted = 1e3 * step.first[:, column('reference', index).place]
         line(left, time, wanted, 'reference', REFERENCE, line_dash='dashed')
@@ -284,5 +285,5 @@ def _name_once(panels: list[Any]) -> None:
 
 def _time(analysis: Analysis, sequence: NDArray[np.int64]) -> FloatArray:
     start = analysis.curves.whole_run.sequence[0]
-    time: FloatArray = (sequence - start) * analysis.run.metrics.sample_time
+    time: FloatArray = (sequence - start) * analysis.run.sample_time
     return time

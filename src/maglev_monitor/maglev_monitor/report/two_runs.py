@@ -103,7 +103,7 @@ def _errors(analyses: Sequence[Analysis]) -> Chart:
         panel = panels.panel(f'error of {axis}', f'|e| [{units(axis)[1]}]', y_axis_type='log')
         for letter, colour, analysis in zip('AB', _COLOURS, analyses, strict=True):
             whole, source = analysis.curves.whole_run, analysis.result['error_source']
-            time = (whole.sequence - whole.sequence[0]) * analysis.run.metrics.sample_time
+            time = (whole.sequence - whole.sequence[0]) * analysis.run.sample_time
             error = magnitude(whole, column(f'{source}_error', index, 1e6))
             line(panel, time, np.maximum(error, FLOOR), letter, colour)
         legend(panel)
