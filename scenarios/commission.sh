@@ -1,3 +1,3 @@
-#!/usr/bin/env bash
+#!/bin/sh
 # Brings a machine up step by step at low current and says what is wired or set wrongly. See --help.
-. "$(dirname -- "${BASH_SOURCE[0]}")/start.bash" commission "$@"
+exec bash -p "$(dirname -- "$(readlink -f -- "$0")")/start.bash" commission "$@"

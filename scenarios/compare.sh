@@ -1,3 +1,3 @@
-#!/usr/bin/env bash
+#!/bin/sh
 # Hundreds of runs: the closed loop as a library, no nodes. See --help.
-. "$(dirname -- "${BASH_SOURCE[0]}")/start.bash" compare "$@"
+exec bash -p "$(dirname -- "$(readlink -f -- "$0")")/start.bash" compare "$@"

@@ -1,3 +1,3 @@
-#!/usr/bin/env bash
+#!/bin/sh
 # The paper's ellipse in y, x and z: lifts off, follows it for 60 s measured, lands.
-. "$(dirname -- "${BASH_SOURCE[0]}")/start.bash" ellipse "$@"
+exec bash -p "$(dirname -- "$(readlink -f -- "$0")")/start.bash" ellipse "$@"

@@ -1,3 +1,3 @@
-#!/usr/bin/env bash
+#!/bin/sh
 # The paper's ellipse with theta turning along: lifts off, follows it for 60 s measured, lands.
-. "$(dirname -- "${BASH_SOURCE[0]}")/start.bash" ellipse_4dof "$@"
+exec bash -p "$(dirname -- "$(readlink -f -- "$0")")/start.bash" ellipse_4dof "$@"

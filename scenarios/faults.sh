@@ -1,3 +1,3 @@
-#!/usr/bin/env bash
+#!/bin/sh
 # Every fault in every phase, on emulated boards, judged by what truly happens. See --help.
-. "$(dirname -- "${BASH_SOURCE[0]}")/start.bash" faults "$@"
+exec bash -p "$(dirname -- "$(readlink -f -- "$0")")/start.bash" faults "$@"

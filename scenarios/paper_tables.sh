@@ -1,3 +1,3 @@
-#!/usr/bin/env bash
+#!/bin/sh
 # Twelve runs, one after another, each as its own scenario; then the page. See --help.
-. "$(dirname -- "${BASH_SOURCE[0]}")/start.bash" paper_tables "$@"
+exec bash -p "$(dirname -- "$(readlink -f -- "$0")")/start.bash" paper_tables "$@"

@@ -1,3 +1,3 @@
-#!/usr/bin/env bash
+#!/bin/sh
 # Machines drawn by the hundred, each flown by each law; the worst through the graph. See --help.
-. "$(dirname -- "${BASH_SOURCE[0]}")/start.bash" robustness "$@"
+exec bash -p "$(dirname -- "$(readlink -f -- "$0")")/start.bash" robustness "$@"

@@ -1,3 +1,3 @@
-#!/usr/bin/env bash
+#!/bin/sh
 # Two runs of the single-motor machine, one after another, each in a folder of its own under --out.
-. "$(dirname -- "${BASH_SOURCE[0]}")/start.bash" single_motor "$@"
+exec bash -p "$(dirname -- "$(readlink -f -- "$0")")/start.bash" single_motor "$@"

@@ -1,3 +1,3 @@
-#!/usr/bin/env bash
+#!/bin/sh
 # The steps of the paper's Table III in y, x, z and theta, each from rest, other axes held.
-. "$(dirname -- "${BASH_SOURCE[0]}")/start.bash" steps "$@"
+exec bash -p "$(dirname -- "$(readlink -f -- "$0")")/start.bash" steps "$@"

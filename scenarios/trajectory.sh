@@ -1,3 +1,3 @@
-#!/usr/bin/env bash
+#!/bin/sh
 # A trajectory by the name of its params/scenario_NAME.yaml, or from a CSV file. See --help.
-. "$(dirname -- "${BASH_SOURCE[0]}")/start.bash" trajectory "$@"
+exec bash -p "$(dirname -- "$(readlink -f -- "$0")")/start.bash" trajectory "$@"

@@ -1,3 +1,3 @@
-#!/usr/bin/env bash
+#!/bin/sh
 # The three numbers of each axis that serve the worst of many machines best. See --help.
-. "$(dirname -- "${BASH_SOURCE[0]}")/start.bash" tune "$@"
+exec bash -p "$(dirname -- "$(readlink -f -- "$0")")/start.bash" tune "$@"

@@ -234,7 +234,7 @@ def test_a_node_that_does_not_listen_yet_ends_without_a_word(tree: Tree) -> None
 
 
 def test_without_setpriv_the_nodes_run_all_the_same(tree: Tree) -> None:
-    for name in ('bash', 'cat', 'dirname', 'sleep'):
+    for name in ('bash', 'cat', 'dirname', 'readlink', 'sleep'):
         (tree.path / 'bin' / name).symlink_to(f'/usr/bin/{name}')
     out = ('--out', str(tree.out))
     code, output = tree.finish(*out, script='ellipse', path='/nowhere')
