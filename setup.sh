@@ -14,8 +14,8 @@ fi
 
 __maglev_setup() { # THIS_FILE
   local root
-  root=$(CDPATH='' \cd -- "$(\dirname -- "$1")" && \pwd -P) || return
-  \env bash "$root/setup/install.sh" || return
+  root=$(\dirname -- "$(\readlink -f -- "$1")") || return
+  \env bash -p "$root/setup/install.sh" || return
   # shellcheck source=/dev/null
   . "$root/install/environment.bash"
 }

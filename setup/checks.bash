@@ -10,6 +10,10 @@ fail() {
   exit 1
 }
 
+fail_to_write() { # PATH
+  fail "cannot write to $1: make it writable, or clone elsewhere"
+}
+
 # How this machine installs the packages named by their Debian and their Fedora names: "DEB..."
 # "RPM..."
 install_hint() {
@@ -64,7 +68,10 @@ check_place() {
   local LC_ALL=C
   [[ $root != *[^A-Za-z0-9._+@~/-]* ]] || fail "the folder '$root' has a sign in its name that ROS" \
     'cannot build with, it takes ASCII letters, digits and . _ - + @ ~: move it'
-  [[ -w $root ]] || fail "cannot write to $root: make it writable, or clone elsewhere"
+  local place
+  for place in "$root" "$root"/{.venv,.cache,build,install}; do
+    [[ ! -e $place || -w $place ]] || fail_to_write "$place"
+  done
   command -v flock >/dev/null || fail "flock is missing: $(install_hint util-linux util-linux-core)"
   [[ $branch == native ]] || check_wheels_machine
 }
@@ -89,7 +96,7 @@ check_python() {
   [[ $1 == wheels ]] || names=(python3 /usr/bin/python3)
   for name in "${names[@]}"; do
     command -v "$name" >/dev/null || continue
-    answer=$(env -u PYTHONHOME PYTHONNOUSERSITE=1 \
+    answer=$(PYTHONNOUSERSITE=1 \
       bash -c "${ros_setup:+. $ros_setup >/dev/null;} exec $name $root/setup/probe.py $1" \
       2>/dev/null) || continue
     if [[ $answer == 'ok '* ]]; then

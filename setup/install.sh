@@ -7,10 +7,11 @@
 # last and removed first, so whatever ends a set-up, the next run sees what is not finished and
 # makes it again.
 set -euo pipefail
-unset CDPATH GREP_OPTIONS
+# Nothing that the caller has set for programs of his own steers those of the set-up.
+unset BASH_ENV GREP_OPTIONS POSIXLY_CORRECT "${!PYTHON@}"
 export LC_ALL=C.UTF-8
 
-root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd -P)
+root=$(dirname -- "$(dirname -- "$(readlink -f -- "${BASH_SOURCE[0]}")")")
 venv=$root/.venv
 cache=$root/.cache
 log=$cache/setup.log
@@ -112,8 +113,10 @@ make_venv() {
   check_space 1300 "$root"
   local system=()
   [[ $branch == wheels ]] || system=(--system-site-packages)
-  rm -f -- "$venv/.stamp" "$venv/.view-stamp" # first: rm may be killed on its way
-  rm -rf -- "$venv"
+  # First, for rm may be killed on its way. All that stands on .venv is of its Python.
+  rm -f -- "$venv"/.{stamp,view-stamp} "$root"/{build,install}/.stamp \
+    "$cache"/{test-tools,numba/*}/.stamp
+  remove_venv
   mkdir -- "$venv"
   touch -- "$venv/.made-by-setup"
   step "making .venv with Python $python_version" "$python" -m venv "${system[@]}" "$venv"
@@ -195,8 +198,8 @@ main() {
     return
   fi
   check_place
-  mkdir -p -- "$cache" || fail "cannot write to $cache: make it writable, or clone elsewhere"
-  exec 9>"$cache/setup.lock"
+  mkdir -p -- "$cache" 2>/dev/null || fail_to_write "$cache"
+  { exec 9>"$cache/setup.lock"; } 2>/dev/null || fail_to_write "$cache/setup.lock"
   if ! flock -n 9; then
     say 'another set-up of this folder is at work, waiting for it'
     flock 9

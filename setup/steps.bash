@@ -113,16 +113,23 @@ explain() { # TITLE OUTPUT
       cause=$(tail -n 1 <<<"$2")
     cause="${cause:0:200} (all of it: $log); mend that"
   fi
-  [[ -f $venv/.stamp ]] || rm -rf -- "$venv"
+  [[ -f $venv/.stamp ]] || remove_venv || true
   fail "$1 failed: $cause; then run again"
 }
 
-# pip of the environment, untouched by the caller's own pip targets and python path. Most modules
-# are never used: those that are, are compiled when they are (see warm_up).
+# Its mark, by which the next set-up knows it for its own, goes last: rm may be killed on its way.
+remove_venv() {
+  [[ ! -d $venv ]] || find "$venv" -mindepth 1 -maxdepth 1 ! -name .made-by-setup -exec rm -rf {} +
+  rm -rf -- "$venv"
+}
+
+# pip of the environment: of the caller's own settings it takes where packages are, and nothing
+# else. Most modules are never used: those that are, are compiled when they are (see warm_up).
 pip_install() {
-  env -u PYTHONPATH -u PYTHONHOME -u PIP_TARGET -u PIP_PREFIX -u PIP_REQUIRE_VIRTUALENV \
-    PIP_USER=0 PIP_DISABLE_PIP_VERSION_CHECK=1 \
-    _ROS_WHEELS_BOOTSTRAP_COMPLETE=1 PYTHONNOUSERSITE=1 \
+  local theirs=("${!PIP_@}") settings
+  mapfile -d '' settings < <("$venv/bin/python" -I "$root/setup/pip_settings.py")
+  env "${theirs[@]/#/-u}" "${settings[@]}" PIP_CONFIG_FILE=/dev/null \
+    PIP_DISABLE_PIP_VERSION_CHECK=1 _ROS_WHEELS_BOOTSTRAP_COMPLETE=1 PYTHONNOUSERSITE=1 \
     bash -c "${ros_setup:+. $ros_setup; } exec \"\$@\"" - \
     "$venv/bin/python" -m pip install --no-input --no-compile --progress-bar off \
     --no-warn-conflicts --retries 2 "$@"
@@ -164,13 +171,14 @@ underlay() {
 }
 
 # Run COMMAND in the underlay and nothing else of the caller's environment but what a build may
-# need.
+# need; his own defaults for colcon are none of it.
 in_underlay() {
   local name keep=()
   for name in HOME USER TMPDIR TERM CC CXX CFLAGS CXXFLAGS LDFLAGS CMAKE_GENERATOR MAKEFLAGS; do
     [[ -z ${!name:-} ]] || keep+=("$name=${!name}")
   done
   env -i "${keep[@]}" PATH="$venv/bin:$PATH" LC_ALL=C.UTF-8 PYTHONNOUSERSITE=1 \
+    COLCON_HOME="$cache/colcon" \
     bash -c "$(underlay)"$'\nexec "$@"' - "$@"
 }
 

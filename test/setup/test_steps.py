@@ -14,21 +14,6 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def test_pip_fills_the_environment_whatever_the_users_own_pip_does(tmp_path: Path) -> None:
-    if not (ROOT / '.venv' / 'bin' / 'python').exists():
-        pytest.skip('this workspace was not set up by setup.sh')
-    (tmp_path / 'pip.conf').write_text('[install]\nuser = true\n')
-    script = f'. {ROOT}/setup/steps.bash; venv={ROOT}/.venv; pip_install --dry-run --no-index pip'
-    done = subprocess.run(
-        ['bash', '-euc', script],
-        env={**os.environ, 'PIP_CONFIG_FILE': str(tmp_path / 'pip.conf')},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-
-
 class Steps:
     """Steps of the set-up that go on beside each other."""
 
