@@ -68,6 +68,8 @@ check_place() {
   local LC_ALL=C
   [[ $root != *[^A-Za-z0-9._+@~/-]* ]] || fail "the folder '$root' has a sign in its name that ROS" \
     'cannot build with, it takes ASCII letters, digits and . _ - + @ ~: move it'
+  ((${#root} <= 230)) || fail "the path of the folder '$root' is too long for programs in it to be" \
+    "started, ${#root} signs and not 230 at most: move it"
   local place
   for place in "$root" "$root"/{.venv,.cache,build,install}; do
     [[ ! -e $place || -w $place ]] || fail_to_write "$place"

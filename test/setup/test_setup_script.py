@@ -176,6 +176,18 @@ def test_a_folder_name_ros_can_build_in(machine: Machine, tmp_path: Path) -> Non
 
 
 @needs_wheels
+@pytest.mark.parametrize(('length', 'words'), [(230, 'missing: make'), (231, '231 signs and not 230')])
+def test_a_path_longer_than_programs_can_name(
+    machine: Machine, tmp_path: Path, length: int, words: str
+) -> None:
+    (machine.bin / 'make').unlink()
+    clone = tmp_path / 'a' / ('b' * (length - len(f'{tmp_path}/a/')))
+    clone.parent.mkdir()
+    machine.root = machine.root.rename(clone)
+    assert words in machine.refusal()
+
+
+@needs_wheels
 def test_a_venv_of_somebody_else_is_not_touched(machine: Machine) -> None:
     theirs = machine.root / '.venv' / 'theirs'
     theirs.parent.mkdir()
