@@ -105,6 +105,8 @@ explain() { # TITLE OUTPUT
     cause="no space left on the disk of $root or of ${TMPDIR:-/tmp}: make room"
   elif grep -qF 'Disk quota exceeded' <<<"$2"; then
     cause='the disk quota is used up: make room'
+  elif grep -qE ' Killed  |Killed signal' <<<"$2"; then
+    cause='the system has killed it, as where memory runs out: end other programs'
   elif grep -qE "$network" <<<"$2"; then
     cause='no network, pip cannot reach its package index: connect, or set https_proxy'
   else

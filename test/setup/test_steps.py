@@ -72,6 +72,18 @@ def test_a_step_that_fails_ends_those_beside_it_and_is_named(tmp_path: Path) -> 
     assert steps.log.read_text().count('quickly done') == 1
 
 
+def test_a_step_that_the_system_kills_is_explained(tmp_path: Path) -> None:
+    killed = """hungry() {
+        until [[ -s $root/pid ]]; do sleep 0.05; done
+        bash -c 'kill -KILL $$'
+        true
+    }
+    """
+    code, lines = Steps(tmp_path, f'{killed}begin long endless; step wrong hungry').end(tmp_path)
+    assert code == 1
+    assert lines[-1].startswith('setup: wrong failed: the system has killed it, as where memory')
+
+
 @pytest.mark.parametrize(('signal_', 'code'), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_interrupted_no_step_goes_on(tmp_path: Path, signal_: signal.Signals, code: int) -> None:
     steps = Steps(tmp_path, 'begin long endless; finish')
