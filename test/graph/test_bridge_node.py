@@ -141,6 +141,7 @@ def test_a_managed_node(stage: str, nodes: Nodes, observer: Observer) -> None:
     observer.watch(MEASUREMENT)
     life = Life(observer, stage)
     assert life.state == 'unconfigured'
+    process.wait_for(f'waiting for ros2 lifecycle set /{stage} configure, ')
     assert life.change(Transition.TRANSITION_CONFIGURE)
     assert life.state == 'inactive'
     assert numbers(observer) == []

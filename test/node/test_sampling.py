@@ -225,6 +225,19 @@ def test_stopped_it_lands_first_and_takes_no_more_samples() -> None:
 
 
 @pytest.mark.parametrize('mode', ['lockstep', 'realtime'])
+def test_a_tick_that_was_due_when_it_was_stopped_finds_nothing_to_do(mode: str) -> None:
+    stage = MadeUpStage()
+    sampling, node = start(stage, mode=mode)
+    node.tick()
+    sampling.stop()
+    measured = list(node.measured)
+    del stage.calls[:]
+    node.tick()
+    assert stage.calls == []
+    assert node.measured == measured
+
+
+@pytest.mark.parametrize('mode', ['lockstep', 'realtime'])
 def test_while_the_stage_is_lost_nothing_ticks(mode: str) -> None:
     stage = MadeUpStage(real=True)
     node = MadeUpNode(mode=mode)

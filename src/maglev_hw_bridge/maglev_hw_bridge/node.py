@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import ClassVar
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -54,23 +54,18 @@ class BridgeNode(StageNode[BridgeNodeParameters, BridgeStage]):
         '~/land': 'std_srvs/Trigger: land without the controller',
     }
 
+    by_hand = (
+        'lifecycle set {} configure',
+        'service call {}/home std_srvs/srv/Trigger',
+        'lifecycle set {} activate',
+    )
+
     def __init__(self) -> None:
         super().__init__('hw_bridge', BridgeNodeParameters, _make_stage)
         self._was_warm = False
         self.offer('~/home', self._home)
         self.offer('~/land', self._land)
         self.create_timer(_LOAD_PERIOD, self._watch_load, clock=self.steady_clock)
-
-    def spin(self, stop: Callable[[], bool]) -> None:
-        """Serve the graph; where it does not bring itself up it says what is waited for."""
-        if not self.parameters.autostart:
-            name = self.get_fully_qualified_name()
-            self.get_logger().warning(
-                'unconfigured, autostart is false: waiting to be configured, homed and activated '
-                f'(ros2 lifecycle set {name} configure, ros2 service call {name}/home '
-                f'std_srvs/srv/Trigger, ros2 lifecycle set {name} activate)'
-            )
-        super().spin(stop)
 
     def configure(self) -> None:
         """Get hold of the boards; what is doubtful about them, or came before, is said."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import gc
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 
@@ -37,6 +37,9 @@ class ManagedNode(LifecycleNodeMixin, MaglevNode[P]):
     A subclass does the work in :meth:`configure`, :meth:`activate`, :meth:`deactivate` and
     :meth:`cleanup`; NodeError, StageError or ParameterError raised there refuses the transition.
     """
+
+    by_hand: ClassVar[Sequence[str]] = ('lifecycle set {} configure', 'lifecycle set {} activate')
+    """The commands of ``ros2``, with its name left out, that bring it up where it does not."""
 
     def __init__(self, name: str, parameter_table: type[P]) -> None:
         MaglevNode.__init__(self, name, parameter_table)
@@ -69,7 +72,7 @@ class ManagedNode(LifecycleNodeMixin, MaglevNode[P]):
         return str(self._state_machine.current_state[1])
 
     def spin(self, stop: Callable[[], bool]) -> None:
-        """Bring itself up where that is wanted, then serve the graph."""
+        """Bring itself up, or say who must, then serve the graph."""
         if self.parameters.autostart:
             self._bringing_up = True
             if self.trigger_configure() != TransitionCallbackReturn.SUCCESS:
@@ -78,6 +81,10 @@ class ManagedNode(LifecycleNodeMixin, MaglevNode[P]):
             gc.collect()
             gc.freeze()
             self._start = self.create_timer(1e-3, self._autostart, clock=self.steady_clock)
+        else:
+            name = self.get_fully_qualified_name()
+            commands = ', '.join(f'ros2 {command.format(name)}' for command in self.by_hand)
+            self.get_logger().warning(f'unconfigured, autostart is false: waiting for {commands}')
         super().spin(stop)
 
     def _autostart(self) -> None:

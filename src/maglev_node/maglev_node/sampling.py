@@ -130,6 +130,11 @@ class Sampling(Generic[P, S]):
             self._node.destroy_timer(self._timer)
             self._timer = None
 
+    @property
+    def _ticks(self) -> bool:
+        """Whether a tick is due: the executor may have had one of a timer that is gone since."""
+        return self._timer is not None and not self._lost
+
     # -- lockstep ----------------------------------------------------------------------------------
 
     def _on_answer(self, message: Any) -> None:
@@ -148,7 +153,7 @@ class Sampling(Generic[P, S]):
             self.answered = not self.stage.restartable
 
     def _watch_answers(self) -> None:
-        if self._lost:
+        if not self._ticks:
             return
         waited = time.monotonic() - self._sample_time
         if not self.answered:
@@ -175,7 +180,7 @@ class Sampling(Generic[P, S]):
     # -- real time ---------------------------------------------------------------------------------
 
     def _on_tick(self) -> None:
-        if self._lost or self._overrun():
+        if not self._ticks or self._overrun():
             return
         pace, stage = self._pace, self.stage
         for taken in count(1):
@@ -183,7 +188,7 @@ class Sampling(Generic[P, S]):
             if self._lost or not pace.again(self.sequence, taken, stage.late):
                 break
         wait = pace.wait(stage.late + time.monotonic() - self._sample_time)
-        if wait is not None and self._timer is not None and not self._lost:
+        if wait is not None and self._ticks:
             self._timer.timer_period_ns = int(1e9 * wait)
             self._timer.reset()
 
