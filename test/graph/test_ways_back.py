@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray
 from flight import (
     LONG,
     LOWER_STOP,
@@ -20,7 +21,7 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 
 from maglev_msgs.msg import ControllerState, Reference
-from maglev_node.topics import CONTROLLER_STATE, CURRENTS, REFERENCE, TRUE_STATE
+from maglev_node.topics import CONTROLLER_STATE, CURRENTS, DIAGNOSTICS, REFERENCE, TRUE_STATE
 
 
 def mode(observer: Observer) -> int:
@@ -117,6 +118,26 @@ def test_emergency_stops_in_flight_and_the_way_back(nodes: Nodes, watching: Obse
     watching.wait(lambda: phase(watching) == Reference.REST)
     assert watching.call('/reference/lift_off').success
     watching.wait(lambda: airborne(watching))
+
+
+def test_without_a_reference_stage_and_controller_say_what_lacks(
+    nodes: Nodes, observer: Observer
+) -> None:
+    nodes.start('plant')
+    controller = nodes.start('controller')
+    diagnostics, said = observer.node.poll(DIAGNOSTICS, DiagnosticArray), dict[str, str]()
+    expected = {
+        'plant': 'waiting for the controller, or the reference it waits for',
+        'controller': 'waiting for a reference on /reference',
+    }
+
+    def heard() -> bool:
+        for message, _ in diagnostics.take():
+            said.update({each.name: each.message for each in message.status})
+        return said == expected
+
+    observer.wait(heard)
+    controller.wait_for(expected['controller'])
 
 
 @pytest.mark.parametrize('name', ['controller', 'reference'])

@@ -6,6 +6,7 @@ import dataclasses
 import secrets
 import time
 from collections.abc import Callable, Mapping
+from operator import attrgetter
 from typing import Any, ClassVar
 
 import numpy as np
@@ -39,6 +40,8 @@ _HAND_PERIOD = 2e-4  # between two looks at the queues during a redesign [s]
 _AT_ONCE = 8  # measurements in one such look: a stage in lockstep has the next one ready at once
 _WATCH_PERIOD = 0.05  # between two looks at an answer that waits [s]
 _IDLE_PATIENCE = 0.04  # for a reference without which nothing is lost [s]
+_ROW = attrgetter('sequence', 'phase', 'segment', 'position', 'velocity', 'acceleration', 'session')
+_OF_REGULATOR = ('position', 'error', 'error_rate', 'virtual_input', 'internal_model')
 _SILENCE = {'lockstep': 2.0, 'realtime': 0.5}  # then the stage is taken for stopped [s]
 
 
@@ -104,6 +107,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         self._progress = ProgressWriter(self, CONTROLLER_PROGRESS, self._state)
         self._watchers = Watchers(self, self.parameters.watchers, CURRENTS, CONTROLLER_STATE)
         self._references = SampleQueue(self, REFERENCE, reference_qos())
+        self._wanted = f'waiting for a reference on {self._references.raw.topic}'
         self._measurements = hear(self, MEASUREMENT, self._on_measurement)
         self._by_hand = (
             self.create_service(Trigger, '~/emergency_stop', self._on_emergency_stop),
@@ -128,17 +132,8 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
                 if message.session != references.session:
                     self.get_logger().warning('another reference is not followed', once=True)
                 continue
-            references.store(
-                message.sequence,
-                message.phase,
-                message.segment,
-                message.position,
-                message.velocity,
-                message.acceleration,
-                message.session,
-            )
-            self._reference_lost = False
-            self._reference_over = message.phase == Phase.END
+            references.store(*_ROW(message))
+            self._reference_lost, self._reference_over = False, message.phase == Phase.END
         self._answer_pending()
 
     def _on_measurement(self, message: Any) -> None:
@@ -177,8 +172,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         """Whether the stage has another mode or sample time, with which there is no working."""
         if self.supervisor.flying:  # then it is a second stage, which will leave
             return bool(message.lockstep != self._lockstep)
-        conflict = self._stage_check.conflict(message)
-        if conflict:
+        if conflict := self._stage_check.conflict(message):
             self.fail(conflict)
         return bool(conflict)
 
@@ -231,11 +225,8 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         message['mode'] = self.supervisor.mode
         message['limited_by'] = self.supervisor.limited_by
         message['saturated'] = self.supervisor.limited_by != 0
-        message['position'] = regulator.position
-        message['error'] = regulator.error
-        message['error_rate'] = regulator.error_rate
-        message['virtual_input'] = regulator.virtual_input
-        message['internal_model'] = regulator.internal_model
+        for field in _OF_REGULATOR:
+            message[field] = getattr(regulator, field)
         message.publish()
         self._progress.publish(sequence, steady=self.supervisor.mode == Mode.REGULATING)
 
@@ -252,16 +243,23 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
 
         Where no current is wanted there is nothing to lose. A run's first answer waits for ever.
         """
-        supervisor, begun = self.supervisor, self.supervisor.references.newest >= 0
-        waiting = supervisor.mode == Mode.WAITING
-        if self._pending is None or (waiting and not begun and self._sequence < 0):
+        if self._unreferenced:
+            self._watchers.remind(self._wanted)
+        if self._pending is None or (self._unreferenced and self._sequence < 0):
             return
-        over = self._reference_over or self._reference_lost or not begun
-        needless = not supervisor.flying and (over or not waiting)
+        supervisor = self.supervisor
+        over = self._reference_over or self._reference_lost or supervisor.references.newest < 0
+        needless = not supervisor.flying and (over or supervisor.mode != Mode.WAITING)
         patience = _IDLE_PATIENCE if needless else self.parameters.reference_timeout
         if time.monotonic() - self._pending_since > patience:
             self._reference_lost |= not needless
             self._answer(self._pending)
+
+    @property
+    def _unreferenced(self) -> bool:
+        """Whether there is a stage, but there was no reference yet."""
+        heard, references = self._pending or self._sequence >= 0, self.supervisor.references
+        return bool(heard) and self.supervisor.mode == Mode.WAITING and references.newest < 0
 
     def may_stop(self) -> bool:
         """Land before ending, unless the stage is silent."""
@@ -359,7 +357,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
                 self._measurements.callback(taken[0])
 
     def diagnose(self) -> tuple[bytes, str, Mapping[str, object]]:
-        """ERROR in a fault and in a landing nobody asked for, WARN without a stage."""
+        """ERROR in a fault, in a landing nobody asked for; WARN without stage or reference."""
         supervisor = self.supervisor
         facts: dict[str, object] = {'mode': supervisor.mode.name, 'sequence': self._sequence}
         if (foreign := supervisor.regulator.foreign) is not None:
@@ -367,6 +365,8 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         failed = supervisor.mode in (Mode.FAULT, Mode.LANDING) or 'landed' in supervisor.reason
         if failed and 'disabled' not in supervisor.reason:
             return DiagnosticStatus.ERROR, f'{supervisor.mode.name}: {supervisor.reason}', facts
+        if self._unreferenced:
+            return DiagnosticStatus.WARN, self._wanted, facts
         if self._pending is None and self._sequence > 0 and self._stage_is_silent():
             text = f'no measurement for {time.monotonic() - self._answered:.1f} s'
             return DiagnosticStatus.WARN, text, facts

@@ -148,10 +148,15 @@ class Watchers:
     def there(self) -> bool:
         """Whether none is missing; now and then says who is."""
         awaited = self.awaited()
-        if awaited and time.monotonic() - self._reminded > _REMINDER:
+        if awaited:
+            self.remind(awaited)
+        return not awaited
+
+    def remind(self, awaited: str) -> None:
+        """Say now and then who is waited for."""
+        if time.monotonic() - self._reminded > _REMINDER:
             self._reminded = time.monotonic()
             self._node.get_logger().info(awaited)
-        return not awaited
 
     def _ready(self, topic: str) -> set[str]:
         here, now = self._node.get_namespace(), time.monotonic()

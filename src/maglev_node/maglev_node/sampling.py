@@ -104,7 +104,10 @@ class Sampling(Generic[P, S]):
 
     def awaited(self) -> str:
         """Who is waited for before the first sample is answered."""
-        return ', '.join(self._publisher.watchers.missing()) or 'a controller'
+        if missing := self._publisher.watchers.missing():
+            return ', '.join(missing)
+        there = self._answers is not None and self._answers.get_publisher_count()
+        return 'the controller, or the reference it waits for' if there else 'a controller'
 
     def emergency_stop(self) -> str:
         """Latch a fault; returns what comes of it."""
