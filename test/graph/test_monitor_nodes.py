@@ -153,6 +153,27 @@ def start_watchers(nodes: Nodes, *arguments: str) -> Process:
     )
 
 
+@pytest.mark.parametrize('redirection', ['>/dev/full', '>&- 2>&-'])
+def test_what_cannot_be_printed_costs_no_bag(
+    redirection: str, nodes: Nodes, feeder: Feeder
+) -> None:
+    bag, output = nodes.folder / 'bag', nodes.folder / 'metrics.json'
+    given = f'recorder:output:={bag}', f'monitor:output:={output}', 'monitor:exit_at_end:=false'
+    arguments = [word for each in given for word in ('-p', each)]
+    shell = ['bash', '-c', f'exec "$0" "$@" {redirection}']
+    command = [*shell, executable('maglev_monitor', 'watchers'), '--ros-args', *arguments]
+    watchers = nodes.run('watchers', command)
+    feeder.wait_for(2)
+    feeder.feed()
+    assert feeder.delivered(20.0)
+    watchers.signal(signal.SIGINT)
+    assert watchers.wait() == 0, watchers.output
+    assert recorded(bag) == dict.fromkeys(TOPICS, SAMPLES)
+    assert metrics(nodes)['missing_samples'] == 0
+    said = 'cannot write to the standard output any more: No space left on device'
+    assert watchers.output.count(said) == ('full' in redirection)
+
+
 def test_in_one_process_recorder_and_monitor_do_as_they_do_apart(
     nodes: Nodes, feeder: Feeder, observer: Observer
 ) -> None:

@@ -20,6 +20,7 @@ from rclpy.time_source import CLOCK_TOPIC
 from maglev_model import parameters as table
 from maglev_model.contract.wire import HARDWARE_ID
 from maglev_model.parameters import ParameterError, parameter
+from maglev_model.programs.command import write_no_more
 from maglev_node import discovery, realtime, ros_parameters
 from maglev_node.polling import PollingNode
 from maglev_node.topics import CLOCK, DIAGNOSTICS
@@ -135,6 +136,15 @@ class MaglevNode(PollingNode, Generic[P]):
             self.get_logger().error(message)
             self.failed = True
             self.finish(1)
+
+    def show(self, text: str) -> None:
+        """Print; a standard output that cannot be written is said once, and no reason to end."""
+        try:
+            print(text, flush=True)
+        except OSError as error:
+            write_no_more()
+            reason = f'cannot write to the standard output any more: {error.strerror}'
+            self.get_logger().warning(reason)
 
     def close(self) -> None:
         """What must happen last; publishers still work. Must be quick and must not raise."""

@@ -10,6 +10,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from functools import partial
 from typing import Any, NoReturn
 
@@ -58,21 +59,24 @@ def run(name: str, caught: Sequence[int], *make_nodes: Callable[[], MaglevNode[A
         gc.freeze()
         _spin(nodes, caught)
     except (NodeError, ParameterError) as error:
-        print(f'{name}: error: {error}', file=sys.stderr, flush=True)
-        return 1
+        return _complain(name, str(error))
     except Exception as error:
         if not _is_user_error(error):
             raise
-        text = str(error).split(', at /')[0].splitlines()[0]
-        print(f'{name}: error: {text}', file=sys.stderr, flush=True)
-        return 1
+        return _complain(name, str(error).split(', at /')[0].splitlines()[0])
     finally:
         _close(nodes)
     if signal.SIGXCPU in caught:
         text = 'no wait for seconds on end: this machine is too slow or too busy for real time'
-        print(f'{name}: error: {text}', file=sys.stderr, flush=True)
-        return 1
+        return _complain(name, text)
     return max(node.exit_code or 0 for node in nodes)
+
+
+def _complain(name: str, text: str) -> int:
+    """Say why a process ends, where that can be written; its exit code."""
+    with suppress(OSError):
+        print(f'{name}: error: {text}', file=sys.stderr, flush=True)
+    return 1
 
 
 def _spin(nodes: Sequence[MaglevNode[Any]], caught: Sequence[int]) -> None:
@@ -106,8 +110,9 @@ def main(
     except Exception:
         sys.excepthook(*sys.exc_info())
         code = 70
-    sys.stdout.flush()
-    sys.stderr.flush()
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError):  # a full disk
+            stream.flush()
     os._exit(code)
 
 

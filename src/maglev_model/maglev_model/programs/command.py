@@ -27,14 +27,14 @@ def leave_with(command: Callable[[], int]) -> NoReturn:
             if sys.stdout is not None:  # closed by whoever started it
                 sys.stdout.flush()
     except BrokenPipeError:
-        _write_no_more()
+        write_no_more()
         code = 128 + signal.SIGPIPE
     except KeyboardInterrupt:
         code = 128 + signal.SIGINT
     except OSError as error:
         if not (said := unwritten(error)):
             raise
-        _write_no_more()
+        write_no_more()
         print(said, file=sys.stderr)
         code = 1
     sys.exit(code)
@@ -47,8 +47,8 @@ def unwritten(error: OSError) -> str:
     return f'error: cannot write to the standard output: {error.strerror}'
 
 
-def _write_no_more() -> None:
-    """Or what is still to be written would fail once more when the process ends."""
+def write_no_more() -> None:
+    """Let what goes to the standard output go nowhere: what has failed would fail once more."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 

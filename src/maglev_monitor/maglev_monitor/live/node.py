@@ -119,7 +119,7 @@ class MonitorNode(WatcherNode[MonitorParameters]):
         now = time.monotonic()
         line = self._watch.line(now)
         if self._watch.started:
-            print(line, flush=True)
+            self.show(line)
         self._look_around(now)
         publishers = {topic: tap.publisher_count() for topic, tap in self._taps.items()}
         for topic, count in publishers.items():
@@ -167,5 +167,5 @@ class MonitorNode(WatcherNode[MonitorParameters]):
             except OSError as error:
                 self.fail(f"cannot write '{self.parameters.output}': {error.strerror}")
         if self._watch.started:
-            print(as_text(result), flush=True)
+            self.show(as_text(result))
         return str(result['verdict'])

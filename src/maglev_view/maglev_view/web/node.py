@@ -56,7 +56,7 @@ class WebNode(MaglevNode[WebNodeParameters]):
         self.create_subscription(DiagnosticArray, DIAGNOSTICS, self._on_diagnostics, 100)
         self.create_timer(1.0 / self.parameters.rate, self._update, clock=self.steady_clock)
         self.create_timer(0.2, self._operator.look, clock=self.steady_clock)
-        print(f'live view: {self._page.address}', flush=True)
+        self.show(f'live view: {self._page.address}')
 
     def diagnose(self) -> tuple[bytes, str, Mapping[str, object]]:
         """Where the page is."""
