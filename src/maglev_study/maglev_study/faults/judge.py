@@ -255,10 +255,8 @@ class Judge:
             foretold = float(told.group(1))
         else:
             at = min(self._end if self.seen is None else self.seen, self._n - 1)
-            watchdog = self.flight.parameters.boards.watchdog
-            expired = min(
-                at + self.flight.samples_in(watchdog), self._n - 1
-            )  # by then a watchdog has cut
+            watchdog = self.flight.samples_in(self.flight.parameters.boards.watchdog)
+            expired = min(at + watchdog, self._n - 1)  # by then it has cut
             foretold = max(self._fall_from(max(at - 1, 0)), self._fall_from(expired))
         most = max(DEGRADED, 1.15 * foretold + 0.03)
         if impact > most:
