@@ -82,6 +82,29 @@ def test_encoders_that_did_not_count_in_the_lift_are_named() -> None:
     assert stage.fault is None
 
 
+@pytest.mark.parametrize('volts', [-4.5, 4.5])
+@pytest.mark.parametrize('phase', [0, 3, 8])
+def test_an_amplifier_that_is_stuck_on_lifts_no_corner_by_a_millimetre(
+    phase: int, volts: float
+) -> None:
+    """Not landed: while that goes on, the amplifier pulls it up. Or so fast as if counts leapt."""
+    stage, boards = bridge(homing__at_start=False)
+    outputs, gaps = boards.outputs, []
+
+    def stuck() -> np.ndarray:
+        gaps.append(stage.guard.arrays.length[:4].min())
+        return np.where(np.arange(12) == phase, volts, outputs())
+
+    boards.outputs = stuck
+    stage.configure()
+    told = r'mrad: (the platen tilted by 1\.\d\d mrad in the lift|encoder gap \d jumped)'
+    with pytest.raises(HomingError, match=told):
+        stage.home()
+    assert stage.fault is not None
+    assert not boards.lines.enabled
+    assert min(gaps) > stage.parameters.machine.gap_max - 1e-3
+
+
 def test_a_fault_of_the_lift_is_told_and_stays() -> None:
     stage, boards = bridge(homing__at_start=False)
     stage.configure()

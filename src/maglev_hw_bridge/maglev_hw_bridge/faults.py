@@ -99,6 +99,13 @@ def astray_fault(watched: Guard) -> tuple[str, str]:
     return reason, 'check the amplifiers, one may be stuck on, and the gap encoders'
 
 
+def askew_fault(watched: Guard) -> tuple[str, str]:
+    """Reason and remedy of a platen that tilts where it was to be lifted a little."""
+    tilt = 1e3 * np.max(np.abs(watched.arrays.position[3:]))
+    reason = f'the platen tilted by {tilt:.2f} mrad in the lift, pulled by what was not commanded'
+    return reason, 'check the amplifiers, one may be stuck on, and the gap encoders'
+
+
 def slide_fault() -> tuple[str, str]:
     """Reason and remedy of a platen that moved along on its stop while no current was commanded."""
     reason = 'the platen slid along on its stop, though no current was commanded'

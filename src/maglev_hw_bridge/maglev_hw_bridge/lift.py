@@ -33,6 +33,8 @@ _MOVED = 1.5e-5  # what has risen by this has left its stop [m]
 TILT = 5e-4
 """More tilt than this in a lift is wrong [rad]."""
 
+_ASKEW = 2.0 * TILT  # what tilts so far on its way is pulled by what was not commanded [rad]
+
 
 class Lift:
     """One lift; afterwards :attr:`risen` and :attr:`tilt` tell what was seen of it."""
@@ -126,4 +128,6 @@ class Lift:
         gaps = stage.read().gap
         self._counted |= gaps != self._gaps
         self._gaps[:] = gaps
+        if stage.mode is Mode.FOLLOWING and np.max(np.abs(watched.position[3:])) > _ASKEW:
+            stage.cut_askew()
         return float(np.mean(gaps))

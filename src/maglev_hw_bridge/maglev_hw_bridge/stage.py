@@ -307,6 +307,13 @@ class BridgeStage(StageLife):
             self._stopped_since = why
         self._raise_fault(kind, why, remedy or 'see to what made it necessary')
 
+    def cut_askew(self) -> None:
+        """End the current of a platen that tilts where it was to rise a little.
+
+        It falls back softly; in a landing an amplifier that is stuck on would lift it farther.
+        """
+        self._raise_fault('current', *faults.askew_fault(self.guard), cut=True)
+
     def _raise_fault(self, kind: str, reason: str, remedy: str, cut: bool = False) -> None:
         if self.fault is not None and not (cut and self.mode is Mode.LANDING):
             return
@@ -324,7 +331,8 @@ class BridgeStage(StageLife):
 
     def _begin_landing(self) -> None:
         state, blind = self.guard.arrays, self.guard.blind
-        if not self.flying or self._touches() or (blind[3:].any() and self._falls_softly()):
+        low = self._lifting and self.fault is not None and self.fault.kind != 'stop'
+        if not self.flying or low or self._touches() or (blind[3:].any() and self._falls_softly()):
             self._disable()
             return
         self.mode, self._landing_samples = Mode.LANDING, 0
