@@ -89,11 +89,26 @@ def test_1_a_stuck_encoder_is_hidden_while_all_others_stand_still(
     assert judge._is_hidden((5,), 99)
 
 
-def test_1_homing_finds_out_when_the_fault_is_latched(flown: Flown) -> None:
-    verdict = flown(Fault('stuck: a gap', (3,)), 'homing', 0.2)
-    assert verdict.violations == ()
-    assert verdict.detection is not None
-    assert verdict.detection < 0.01
+def test_1_homing_finds_out_when_the_fault_is_latched() -> None:
+    """Not when homing is refused, after a landing."""
+    flight = Flight(0)
+    flight.bridge.configure()
+    judge = Judge(flight)
+    observe, pressed = flight.world.observe, []
+
+    def press() -> None:
+        observe()
+        state = judge.log()[0]
+        if not pressed and state[-1, 0] < state[0, 0] - 2e-4:  # in the lift
+            flight.world.stop_pressed = True
+            pressed.append(len(state))
+
+    flight.world.observe = press
+    assert not flight.bridge.home()
+    assert judge.reason == 'the emergency stop is pressed'
+    assert judge.seen is not None
+    assert judge.seen <= pressed[0] + 2
+    assert len(judge.log()[0]) > judge.seen + 100
 
 
 def test_2_a_landing_that_is_cut(flown: Flown, monkeypatch: pytest.MonkeyPatch) -> None:
