@@ -41,7 +41,6 @@ _AT_ONCE = 8  # measurements in one such look: a stage in lockstep has the next 
 _WATCH_PERIOD = 0.05  # between two looks at an answer that waits [s]
 _IDLE_PATIENCE = 0.04  # for a reference without which nothing is lost [s]
 _ROW = attrgetter('sequence', 'phase', 'segment', 'position', 'velocity', 'acceleration', 'session')
-_OF_REGULATOR = ('position', 'error', 'error_rate', 'virtual_input', 'internal_model')
 _SILENCE = {'lockstep': 2.0, 'realtime': 0.5}  # then the stage is taken for stopped [s]
 
 
@@ -225,8 +224,10 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         message['mode'] = self.supervisor.mode
         message['limited_by'] = self.supervisor.limited_by
         message['saturated'] = self.supervisor.limited_by != 0
-        for field in _OF_REGULATOR:
-            message[field] = getattr(regulator, field)
+        message['position'] = regulator.position
+        message['error'], message['error_rate'] = regulator.error, regulator.error_rate
+        message['virtual_input'] = regulator.virtual_input
+        message['internal_model'] = regulator.internal_model
         message.publish()
         self._progress.publish(sequence, steady=self.supervisor.mode == Mode.REGULATING)
 
@@ -247,9 +248,8 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
             self._watchers.remind(self._wanted)
         if self._pending is None or (self._unreferenced and self._sequence < 0):
             return
-        supervisor = self.supervisor
-        over = self._reference_over or self._reference_lost or supervisor.references.newest < 0
-        needless = not supervisor.flying and (over or supervisor.mode != Mode.WAITING)
+        over = self._reference_over or self._reference_lost or self.supervisor.references.newest < 0
+        needless = not self.supervisor.flying and (over or self.supervisor.mode != Mode.WAITING)
         patience = _IDLE_PATIENCE if needless else self.parameters.reference_timeout
         if time.monotonic() - self._pending_since > patience:
             self._reference_lost |= not needless

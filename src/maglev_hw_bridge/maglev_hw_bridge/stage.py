@@ -61,6 +61,7 @@ class BridgeStage(StageLife):
         self._to_catch_up = 0  # late samples still to come when the landing began
         self._lower_stop = self.parameters.machine.gap_max
         self._stale_samples = math.ceil(self.parameters.fault.stale / self.sample_time - 1e-9)
+        self._one_count = 1.5 * max(self.parameters.encoder.resolution[4:])  # of x or z [m]
         self._longest_stop = round(self.parameters.boards.stop_time / self.sample_time)
         self._landing_samples = 0
         self._named: set[tuple[int, ...]] = set()  # what the fault latched says of sensing
@@ -223,8 +224,7 @@ class BridgeStage(StageLife):
             return False
         place = self.guard.arrays.position[1:3]
         away = float(np.max(np.abs(place - self._parked_at)))
-        count = max(self.parameters.encoder.resolution[4:])
-        most = max(_SLIDING * self.sample_time, 1.5 * count)
+        most = max(_SLIDING * self.sample_time, self._one_count)
         if self.guard.arrays.samples <= 1:
             most = _PARKED
         leapt = float(np.max(np.abs(place - self._was_at))) > most
@@ -331,8 +331,9 @@ class BridgeStage(StageLife):
 
     def _begin_landing(self) -> None:
         state, blind = self.guard.arrays, self.guard.blind
-        low = self._lifting and self.fault is not None and self.fault.kind != 'stop'
-        if not self.flying or low or self._touches() or (blind[3:].any() and self._falls_softly()):
+        fails_in_lift = self._lifting and self.fault is not None and self.fault.kind != 'stop'
+        near_the_stop = self._touches() or (blind[3:].any() and self._falls_softly())
+        if not self.flying or fails_in_lift or near_the_stop:
             self._disable()
             return
         self.mode, self._landing_samples = Mode.LANDING, 0
