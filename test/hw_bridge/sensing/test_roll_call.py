@@ -74,3 +74,40 @@ def test_a_bound_that_is_just_reached_is_not_yet_passed() -> None:
     assert not call_the_roll(watched.block[0], True, np.arange(6) == 0)
     watched.left[0] = np.nextafter(watched.left[0], 1.0)
     assert call_the_roll(watched.block[0], True, np.arange(6) == 0)
+
+
+@pytest.mark.parametrize('quiet', range(4))
+@pytest.mark.parametrize(
+    ('across', 'left', 'right', 'silent', 'lost'),
+    [
+        (-4e-5, -2e-5, -2e-5, 0, False),  # it turns about that corner
+        (-4e-5, -3.7e-5, -3.7e-5, 0, False),
+        (-4e-5, -3.8e-5, -3.8e-5, 0, True),  # by the other three it is 36 um off the stop
+        (-4e-5, 1e-6, -1e-6, 0, True),  # or below it
+        (-4e-5, 0.0, -4e-5, 1, True),  # two may be stuck
+        (-4e-5, 0.0, -4e-5, 0, False),
+    ],
+)
+def test_who_has_not_moved_as_the_other_three_tell_is_not_missed(
+    quiet: int, across: float, left: float, right: float, silent: int, lost: bool
+) -> None:
+    watched = hovering()
+    watched.past[0] = watched.believed
+    watched.answered[:] = 1
+    watched.answered[quiet] = 0
+    watched.answered[(quiet + 1) % 4] = 1 - silent
+    for k, gone in ((1, left), (2, across), (3, right)):
+        watched.left[(quiet + k) % 4] = gone
+    assert call_the_roll(watched.block[0], True, np.zeros(6, bool)) == lost
+    assert (watched.trust[quiet] == LOST) == lost
+
+
+@pytest.mark.parametrize('k', [1, 2, 3])
+def test_who_is_lost_cannot_excuse_another(k: int) -> None:
+    watched = hovering()
+    watched.past[0] = watched.believed
+    watched.left[:] = -4e-5
+    watched.answered[:], watched.left[2] = [0, 1, 1, 1], -8e-5
+    watched.trust[k] = LOST
+    assert call_the_roll(watched.block[0], True, np.zeros(6, bool))
+    assert watched.trust[0] == LOST

@@ -25,7 +25,9 @@ from maglev_model.platen import gaps_from_outputs, output_accelerations, outputs
 
 Flags = NDArray[np.bool_]
 
-_SUPPORT = 2e-4  # this near a stop it may carry the platen [m]
+SUPPORT = 2e-4
+"""This near a stop it may carry the platen [m]."""
+
 _SUPPORTED = 1.5  # what the weight and its support may then differ in from the model's [m/s²]
 _TILT_SUPPORT = 1e-4  # the same of the tilts [rad]
 
@@ -116,7 +118,7 @@ def _push(o: ObserverArrays, current: FloatArray) -> tuple[float, float, float, 
 @borrowing
 def supported(o: ObserverArrays, axis: int) -> bool:
     """Whether a stop may hold an axis."""
-    near = _SUPPORT if axis < 3 else _TILT_SUPPORT
+    near = SUPPORT if axis < 3 else _TILT_SUPPORT
     room = min(o.upper[axis] - o.position[axis], o.position[axis] - o.lower[axis])
     return bool(room < near)
 
@@ -125,7 +127,7 @@ def supported(o: ObserverArrays, axis: int) -> bool:
 def _stopped(o: ObserverArrays, axis: int) -> bool:
     """Whether the model would carry an axis into a stop that it is at."""
     end = o.upper[axis] if o.model_rate[axis] > 0.0 else o.lower[axis]
-    return bool(abs(end - o.position[axis]) < _SUPPORT)
+    return bool(abs(end - o.position[axis]) < SUPPORT)
 
 
 @compiled

@@ -82,6 +82,19 @@ def await_lift_off(g: GuardArrays) -> None:
 
 
 @borrowing
+def _excused(g: GuardArrays, i: int) -> bool:
+    """Whether the other three gaps show that this one has no reason to answer yet.
+
+    A platen that tilts as it lifts off turns about a corner.
+    """
+    for k in range(4):
+        if k != i and (g.trust[k] == LOST or g.answered[k] == 0):
+            return False
+    across, left, right = g.left[(i + 2) % 4], g.left[(i + 1) % 4], g.left[(i + 3) % 4]
+    return bool(abs(left + right - across) <= g.roll_call)
+
+
+@borrowing
 def call_the_roll(g: GuardArrays, flying: bool, counted: Flags) -> bool:
     """Do without gap encoders that do not answer when the platen lifts off; whether there are some.
 
@@ -99,7 +112,7 @@ def call_the_roll(g: GuardArrays, flying: bool, counted: Flags) -> bool:
         called = called or (g.trust[i] == SOUND and abs(g.left[i]) > g.roll_call)
     found = False
     for i in range(4):
-        if called and g.answered[i] == 0 and g.trust[i] != LOST:
+        if called and g.answered[i] == 0 and g.trust[i] != LOST and not _excused(g, i):
             g.trust[i], g.blamed[i], found = LOST, 1, True
     if found:
         observer.bound_disturbance(g, PHI)
