@@ -210,6 +210,16 @@ def test_a_platen_that_slides_along_without_current_is_a_fault(
         assert flight.stage.fault is None  # it stands there now
 
 
+@pytest.mark.parametrize(('speed', 'slid'), [(0.5e-3, False), (0.9e-3, True)])
+def test_what_creeps_along_on_its_stop_is_pulled_by_no_amplifier(speed: float, slid: bool) -> None:
+    flight = Flight(hover(LOWER_STOP))
+    for k in range(1500):
+        flight.rig.place(np.array([LOWER_STOP, 1e-3 * speed * k, 0.0, 0.0, 0.0]))
+        flight.stage.read()
+        flight.stage.write(np.zeros(4), np.zeros(4))
+    assert ('slid along' in str(flight.stage.fault)) == slid
+
+
 @pytest.mark.parametrize(('height', 'refused'), [(0.031, False), (0.03097, True)])
 def test_no_current_may_be_asked_for_where_the_encoders_have_it_on_the_stop(
     height: float, *, refused: bool

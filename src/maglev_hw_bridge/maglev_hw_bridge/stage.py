@@ -29,6 +29,7 @@ FloatArray = NDArray[np.float64]
 _ON_THE_STOP, _AT_REST = 2e-5, 1e-2  # nearer the lower stop and slower it rests [m], [m/s]
 _NEAR, _STILL, _REST_TIME = 2e-4, 2e-5, 0.1  # so it does where it moves no more there [m, m, s]
 _PARKED = 1e-4  # so far at most it moves along x and z in that time where it stands [m]
+_CREPT = 0.5  # what it moves in longer it crept, as under the pull of a cable [s]
 _SLIDING = 0.1  # faster it is moved, or homed [m/s]
 _CORNERS = np.array([[-1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, -1.0]])  # (5): gaps by phi, theta
 _SOFT = 0.05  # a degraded landing's speed at the stop [m/s]
@@ -235,6 +236,9 @@ class BridgeStage(StageLife):
             self._parked_at[:] = place
         else:
             self._parked_samples += 1
+        if self._parked_samples * self.sample_time >= _CREPT:
+            self._parked_samples = round(_REST_TIME / self.sample_time)
+            self._parked_at[:] = place
         self._was_at[:] = place
         return slid
 
