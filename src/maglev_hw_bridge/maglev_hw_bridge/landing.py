@@ -14,7 +14,7 @@ import numpy as np
 
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.sensing.observer import Flags
-from maglev_model.axes import THETA, FloatArray, X, Z
+from maglev_model.axes import PHI, THETA, FloatArray, X, Z
 from maglev_model.compiled import compiled
 from maglev_model.compiled.records import Block, Record
 from maglev_model.inverse import Answer, CurrentLimits, exact_inverse
@@ -38,7 +38,11 @@ _CARRY = np.array([0.0, -2.0, 2.0, -1.0, 1.0])
 x and z come first: along them the platen runs off to a stop 50 mm away, in a tilt to one 2 mm away.
 """
 
+ASKEW, SOON = 8e-4, 0.01
+"""What is, or soon will be, so far tilted off its way near the lower stop is pulled [rad], [s]."""
+
 _PATIENCE = 2.0  # times as far x and z may be off their way where a cut would throw it up
+_SOFT = 2e-4  # so near its stop what tilts is not waited for [m]
 _TILT = 0.95  # share of the attraction that tilts may take there
 _BRAKING_UPWARD = 0.1  # of y [s]
 _SEATED = 5e-5  # so near the lower stop a cut is soft [m]
@@ -65,6 +69,7 @@ class LandingArrays(Record):
     descent_start: float  # [s]
     descent_time: float  # [s]
     settle_time: float  # [s]
+    floor: float  # air gap on the lower stop [m]
     aim: float  # of the descent [m]
     end: float  # air gap at which it is over whatever the time, or infinite [m]
     period: float  # [s]
@@ -89,6 +94,7 @@ def land(block: Block, position: FloatArray, rate: FloatArray, disturbance: Floa
     time = landing.elapsed
     wanted = np.empty(5)
     thrown_up = position[0] < landing.balance  # by a cut
+    down = position[0] > landing.floor - _SOFT
     for axis in range(5):
         left, velocity, acceleration = quintic_to_zero(
             landing.offset[axis], landing.speed[axis], 0.0, landing.braking[axis], time
@@ -104,7 +110,10 @@ def land(block: Block, position: FloatArray, rate: FloatArray, disturbance: Floa
             )
             target = landing.aim + left
         patience = _PATIENCE if _ACROSS[axis] and thrown_up else 1.0
-        if abs(target - position[axis]) > patience * landing.stray[axis]:
+        off = abs(target - position[axis])
+        if off > patience * landing.stray[axis]:
+            landing.astray = True
+        if down and axis >= PHI and off + SOON * abs(velocity - rate[axis]) > ASKEW:
             landing.astray = True
         wanted[axis] = (
             acceleration
@@ -144,6 +153,7 @@ class Landing:
             stiffness=landing.stiffness,
             damping=landing.damping,
             settle_time=landing.settle_time,
+            floor=machine.gap_max,
             aim=machine.gap_max + landing.depth,
             stray=landing.stray,
             balance=_balance(parameters),

@@ -9,20 +9,22 @@ that are not plugged in either, so no push is longer than what the platen falls 
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
-from maglev_hw_bridge.landing import LEAST_ATTRACTION
+from maglev_hw_bridge.landing import ASKEW, LEAST_ATTRACTION, SOON
 from maglev_hw_bridge.mode import Mode
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_model.axes import FloatArray
+from maglev_hw_bridge.sensing.observer import SUPPORT
+from maglev_model.axes import FloatArray, X, Y, Z
 from maglev_model.currents import exact_currents
 from maglev_model.inverse import CurrentLimits
 from maglev_model.machine import machine_constants
 
 _RISE, _HOVER = 0.5, 0.5  # [s]
-_INTEGRAL = 128_000.0  # acceleration per error of y and time [1/s³]
+_INTEGRATION = 20.0  # of the errors of y and the tilts [1/s]
 _PUSHES = 23
 _PAUSE, _PUSH = 0.09, 0.004  # before and of each [s]; no encoder is judged to be stuck in them
 _GROWTH = 100.0  # of the push while it lasts [m/s³]
@@ -30,10 +32,7 @@ _NO_PUSH = 2.0  # about what the platen weighs more than its magnets carry there
 _MOST_PUSH = -7.0  # a platen 10 % heavier, with magnets 10 % weaker, rises at about -4.5 [m/s²]
 _MOVED = 1.5e-5  # what has risen by this has left its stop [m]
 
-TILT = 5e-4
-"""More tilt than this in a lift is wrong [rad]."""
-
-_ASKEW = 2.0 * TILT  # what tilts so far on its way is pulled by what was not commanded [rad]
+_TILT = 5e-4  # more is wrong in the air [rad]
 
 
 class Lift:
@@ -61,7 +60,7 @@ class Lift:
     @property
     def fine(self) -> bool:
         """Whether the platen rose as it was to."""
-        return 0.5 * self.height < self.risen < 1.5 * self.height and self.tilt <= TILT
+        return 0.5 * self.height < self.risen < 1.5 * self.height and self.tilt <= _TILT
 
     @property
     def silent(self) -> list[int]:
@@ -81,16 +80,21 @@ class Lift:
         self._gaps[:] = stage.read().gap
         rest = float(np.mean(self._gaps))
         target = watched.position.copy()
-        start = target[0]
+        start = target[Y]
         target[3:] = 0.0
-        push = self._push(stage, target, rest)
-        if push is None:
+        push = np.zeros(5)
+        push[Y] = self._push(stage, target, rest)
+        if math.isnan(push[Y]):
             return  # it still rests, whatever on, and what called ends the current
+        integral = _INTEGRATION * self._period * self._stiffness
+        integral[[X, Z]] = 0.0  # guides hold the platen there
         heights = []
         for n in range(round((_RISE + _HOVER) / self._period)):
             way = min(n * self._period / _RISE, 1.0)
-            target[0] = start - self.height * way**2 * (3.0 - 2.0 * way)
-            push += self._period * _INTEGRAL * (target[0] - watched.position[0])
+            target[Y] = start - self.height * way**2 * (3.0 - 2.0 * way)
+            push += integral * (target - watched.position)
+            if watched.upper[Y] - watched.position[Y] < SUPPORT:  # of an unknown share of it
+                stage.guard.settle()
             risen = rest - self._sample(stage, target, push)
             if way >= 1.0:
                 heights.append(risen)
@@ -103,31 +107,33 @@ class Lift:
             stage.read()
         self.risen = float(np.mean(heights)) if heights else 0.0
 
-    def _push(self, stage: Any, target: FloatArray, rest: float) -> float | None:
-        """The push under which it rose from ``rest`` [m/s²]; None when it did not."""
-        watched, push = stage.guard.arrays, _NO_PUSH
+    def _push(self, stage: Any, target: FloatArray, rest: float) -> float:
+        """The push under which it rose from ``rest`` [m/s²]; not a number when it did not."""
+        watched, push = stage.guard.arrays, np.array([_NO_PUSH, 0.0, 0.0, 0.0, 0.0])
+        none = push.copy()
         pause, length = round(_PAUSE / self._period), max(round(_PUSH / self._period), 1)
         for _ in range(_PUSHES):
             for n in range(pause + length):
                 stage.guard.settle()
                 if n >= pause:
-                    push = max(push - _GROWTH * self._period, _MOST_PUSH)
-                target[0] = watched.position[0]
-                risen = rest - self._sample(stage, target, push if n >= pause else _NO_PUSH)
+                    push[Y] = max(push[Y] - _GROWTH * self._period, _MOST_PUSH)
+                target[Y] = watched.position[Y]
+                risen = rest - self._sample(stage, target, push if n >= pause else none)
                 if risen >= _MOVED or stage.mode is not Mode.FOLLOWING:
-                    return push
-        return None
+                    return float(push[Y])
+        return math.nan
 
-    def _sample(self, stage: Any, target: FloatArray, push: float) -> float:
-        """One sample towards ``target`` (5,) with a push [m/s²]; the mean gap after it [m]."""
+    def _sample(self, stage: Any, target: FloatArray, push: FloatArray) -> float:
+        """One sample towards ``target`` (5,) with a ``push`` (5,); the mean gap after it [m]."""
         watched = stage.guard.arrays
         error = target - watched.position
-        wanted = self._stiffness * error - self._damping * watched.rate
-        wanted[0] = max(wanted[0] + push, _MOST_PUSH)
+        wanted = self._stiffness * error - self._damping * watched.rate + push
+        wanted[Y] = max(wanted[Y], _MOST_PUSH)
         stage.write(*self._currents(watched.position, wanted))
         gaps = stage.read().gap
         self._counted |= gaps != self._gaps
         self._gaps[:] = gaps
-        if stage.mode is Mode.FOLLOWING and np.max(np.abs(watched.position[3:])) > _ASKEW:
+        soon = np.abs(watched.position[3:]) + SOON * np.abs(watched.rate[3:])
+        if stage.mode is Mode.FOLLOWING and np.max(soon) > ASKEW:
             stage.cut_askew()
         return float(np.mean(gaps))
