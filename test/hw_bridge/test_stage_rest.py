@@ -12,9 +12,9 @@ from maglev_hw_bridge.stage import BridgeStage, Mode
 @pytest.mark.parametrize(
     ('above', 'rate', 'rests'),
     [
-        (1.9e-5, 0.0, True),
-        (2e-5, 0.0, False),
-        (2.1e-5, 0.0, False),
+        (1.7e-5, 0.0, True),
+        (1.8e-5, 0.0, False),
+        (1.9e-5, 0.0, False),
         (0.0, 0.99e-2, True),
         (0.0, -0.99e-2, True),
         (0.0, 1e-2, False),
@@ -22,7 +22,7 @@ from maglev_hw_bridge.stage import BridgeStage, Mode
         (0.0, -1.01e-2, False),
     ],
 )
-def test_nearer_than_two_counts_and_slower_than_a_count_in_a_sample_it_rests(
+def test_nearer_than_18_um_and_slower_than_a_count_in_a_sample_it_rests(
     above: float, rate: float, *, rests: bool
 ) -> None:
     stage, _ = active()

@@ -26,7 +26,7 @@ from maglev_model.contract.stage import EncoderSample, Fault, StageError, Truth,
 
 FloatArray = NDArray[np.float64]
 
-_ON_THE_STOP, _AT_REST = 2e-5, 1e-2  # nearer the lower stop and slower it rests [m], [m/s]
+_ON_THE_STOP, _AT_REST = 1.8e-5, 1e-2  # nearer the lower stop and slower it rests [m], [m/s]
 _NEAR, _STILL, _REST_TIME = 2e-4, 2e-5, 0.1  # so it does where it moves no more there [m, m, s]
 _PARKED = 1e-4  # so far at most it moves along x and z in that time where it stands [m]
 _CREPT = 0.5  # what it moves in longer it crept, as under the pull of a cable [s]
