@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import signal
+
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from flight import (
     LONG,
     LOWER_STOP,
+    WATCHED,
     airborne,
     fly,
     gap,
@@ -118,6 +121,41 @@ def test_emergency_stops_in_flight_and_the_way_back(nodes: Nodes, watching: Obse
     watching.wait(lambda: phase(watching) == Reference.REST)
     assert watching.call('/reference/lift_off').success
     watching.wait(lambda: airborne(watching))
+
+
+@pytest.mark.parametrize('later', ['nobody', 'controller', 'reference'])
+def test_a_stage_that_ends_in_flight_and_begins_anew(
+    nodes: Nodes, watching: Observer, later: str
+) -> None:
+    """The others rest with it, whoever of them finds it first, and fly again by a lift-off."""
+    graph = fly(nodes, LONG)
+    watching.wait(lambda: airborne(watching))
+    samples(watching, 500)
+    graph['plant'].kill()
+    if later in graph:
+        graph[later].signal(signal.SIGSTOP)
+    nodes.start('plant', WATCHED, params=('benchmark.yaml',))
+    if later != 'reference':
+        graph['reference'].wait_for('the stage began anew in flight: resting until ~/lift_off')
+    if later != 'controller':
+        graph['controller'].wait_for('the stage began anew')
+    if later in graph:
+        graph[later].signal(signal.SIGCONT)
+    watching.wait(lambda: mode(watching) == ControllerState.WAITING)
+    watching.wait(lambda: phase(watching) == Reference.REST)
+    samples(watching, 30)
+    assert landed_without_current(watching)
+    assert watching.call('/reference/lift_off').success
+    watching.wait(lambda: airborne(watching))
+
+
+def test_a_run_whose_stage_began_anew_is_over(nodes: Nodes, watching: Observer) -> None:
+    graph = fly(nodes, LONG, 'exit_at_end:=true')
+    watching.wait(lambda: airborne(watching))
+    graph['plant'].kill()
+    nodes.start('plant', WATCHED, params=('benchmark.yaml',))
+    assert graph['reference'].wait() == 1
+    assert 'the run was left: the stage began anew in flight' in graph['reference'].output
 
 
 def test_without_a_reference_stage_and_controller_say_what_lacks(

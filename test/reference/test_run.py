@@ -168,6 +168,18 @@ def test_another_stage_is_waited_for_anew_but_not_while_the_platen_flies():
     assert not run.lift_off(REST)
 
 
+def test_a_stage_that_stopped_in_flight_is_followed_by_another():
+    run = flying_at(5000)
+    assert run.observe(3, silent=True)
+    assert (run.newest, run.started, run.autostart, run.phase) == (3, False, False, Phase.REST)
+    assert run.left == 'the stage began anew in flight'
+    assert run.over
+    run.start(run.plan(REST))
+    assert not run.over
+    assert run.lift_off(REST)
+    assert run.left == ''
+
+
 def test_a_start_from_elsewhere_is_refused_and_may_be_tried_again():
     run = ReferenceRun(PARAMETERS, 64, True)
     run.observe(7)

@@ -31,6 +31,7 @@ from maglev_node.topics import (
     MEASUREMENT,
     REFERENCE,
     SAMPLE_TOPICS,
+    SILENCE,
     reference_qos,
     sample_qos,
 )
@@ -41,7 +42,6 @@ _AT_ONCE = 8  # measurements in one such look: a stage in lockstep has the next 
 _WATCH_PERIOD = 0.05  # between two looks at an answer that waits [s]
 _IDLE_PATIENCE = 0.04  # for a reference without which nothing is lost [s]
 _ROW = attrgetter('sequence', 'phase', 'segment', 'position', 'velocity', 'acceleration', 'session')
-_SILENCE = {'lockstep': 2.0, 'realtime': 0.5}  # then the stage is taken for stopped [s]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -126,11 +126,9 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         """Take what has arrived ahead of time, in bursts: being woken for each slows the loop."""
         references = self.supervisor.references
         for message in self._references.take():
-            follows = references.continued_by(message.session, message.sequence)
-            if self.supervisor.flying and not follows:  # a second finds the first and leaves
-                if message.session != references.session:
-                    self.get_logger().warning('another reference is not followed', once=True)
-                continue
+            if self.supervisor.flying and message.session != references.session:
+                self.get_logger().warning('another reference is not followed', once=True)
+                continue  # it finds the first and leaves
             references.store(*_ROW(message))
             self._reference_lost, self._reference_over = False, message.phase == Phase.END
         self._answer_pending()
@@ -269,7 +267,7 @@ class ControllerNode(MaglevNode[ControllerNodeParameters]):
         return not self.supervisor.flying or self._stage_is_silent()
 
     def _stage_is_silent(self) -> bool:
-        return time.monotonic() - self._answered > _SILENCE[self.parameters.mode]
+        return time.monotonic() - self._answered > SILENCE[self.parameters.mode]
 
     def _on_enable(self, request: Any, response: Any) -> Any:
         action = self.supervisor.enable if request.data else self.supervisor.disable

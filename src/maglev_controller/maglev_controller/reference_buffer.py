@@ -40,10 +40,6 @@ class ReferenceBuffer:
         if not self.renewed:
             self.clear()
 
-    def continued_by(self, session: int, sequence: int) -> bool:
-        """Whether a reference is of the sender of those held, and newer than all of them."""
-        return session == self.session and sequence > self.newest
-
     def store(
         self,
         sequence: int,

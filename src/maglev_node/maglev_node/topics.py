@@ -41,6 +41,9 @@ PROGRESS = {STAGE_PROGRESS: MEASUREMENT, CONTROLLER_PROGRESS: CONTROLLER_STATE}
 PROGRESS_PERIOD = 16
 """Samples from one message on them to the next, in flight."""
 
+SILENCE = {'lockstep': 2.0, 'realtime': 0.5}
+"""So long without a measurement, and the stage is taken for stopped [s]."""
+
 
 def sampled(topic: str) -> str:
     """The sample topic whose messages are on a topic: itself, but for those of progress."""

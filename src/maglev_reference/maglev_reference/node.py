@@ -9,7 +9,6 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 from diagnostic_msgs.msg import DiagnosticStatus
-from rclpy.serialization import deserialize_message
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
@@ -29,22 +28,21 @@ from maglev_node.topics import (
     CONTROLLER_PROGRESS,
     PROGRESS_PERIOD,
     REFERENCE,
+    SILENCE,
     STAGE_PROGRESS,
     reference_qos,
     sample_qos,
 )
+from maglev_reference import trajectory_message
 from maglev_reference.accuracy import summary, warnings
 from maglev_reference.check import UnreachableError
-from maglev_reference.given_points import Point
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.run import ReferenceRun, samples_ahead
 from maglev_reference.timeline import Timeline
 
 _LOOK_PERIOD = 0.25  # between two looks at the graph while the stage is flown [s]
 _MOST_AHEAD = 800  # samples; a controller holds 1024
-_LONGEST_TRAJECTORY = 100_000  # [bytes], which are read in less time than is published ahead
 _REMINDER = 5.0  # between two lines about what is waited for [s]
-_SILENCE = 0.5  # without a measurement from which on it is said [s]
 _IDLE_PERIOD = 0.02  # from one sample to the next while nothing shall move, in lockstep [s]
 _PLANNED = ('phase', 'segment', 'position', 'velocity', 'acceleration', 'target')
 _NEWS_TIME = 0.2  # in which an answer shows what a call has changed in the controller [s]
@@ -136,7 +134,9 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         for state in self._states.take(1):
             self._run.observe_controller(Mode(state.mode), state.sequence)
         news = self._take_measurement()
-        if not self._run.started:
+        if self.parameters.exit_at_end and self._run.over:
+            self._end()
+        elif not self._run.started:
             self._wait(news)
         elif not news:
             self._watch()
@@ -144,13 +144,19 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
             self._give_way()
             self._consider()
             self._publish()
-            self._follow_phase()
+            self._tell_phase()
+
+    @property
+    def _silent(self) -> float:
+        """Time without a measurement [s]."""
+        return time.monotonic() - self._seen
 
     def _take_measurement(self) -> bool:
         """Take the newest measurement; false when there is none, or one to be left alone."""
         news = False
         for message in self._measurements.take(1):
-            if self._run.observe(message.sequence) and self._runs_alike(message):
+            silent = self._silent > SILENCE[self.parameters.mode]
+            if self._run.observe(message.sequence, silent=silent) and self._runs_alike(message):
                 news, self._measured, self._seen = True, message, time.monotonic()
         return news
 
@@ -220,7 +226,8 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         self._run.start(timeline)
         self._reminded = time.monotonic()
         start = 'starting' if autostart else 'resting until ~/lift_off'
-        self.get_logger().info(f'{start} at sample {self._run.newest}')
+        left = f'left the run, {self._run.left}: ' if self._run.left else ''
+        self.get_logger().info(f'{left}{start} at sample {self._run.newest}')
 
     def _give_way(self) -> None:
         """Leave the run when the controller does not follow."""
@@ -264,12 +271,10 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
                 message[field] = getattr(block, field)[row]
             message.publish()
 
-    def _follow_phase(self) -> None:
-        """Say what the stage is asked to do now, and end where that is wanted."""
+    def _tell_phase(self) -> None:
+        """Say what the stage is asked to do now."""
         if self._run.enter_phase():
             self.get_logger().info(f'{self._run.phase.name} at sample {self._run.newest}')
-        if self.parameters.exit_at_end and self._run.over:
-            self._end()
 
     def _end(self) -> None:
         if self._run.left:
@@ -278,8 +283,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
             self.finish(0)
 
     def _watch(self) -> None:
-        silent = time.monotonic() - self._seen
-        if silent < self.parameters.timeout:
+        if self._silent < self.parameters.timeout:
             return
         if self._run.grounded:  # another stage may follow
             if self._run.phase == Phase.END and self.parameters.exit_at_end:
@@ -288,21 +292,12 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         who = 'the stage, or the controller it waits for, has stopped'
         if self._measurements.raw.publisher_count() == 0:
             who = 'the stage is gone'
-        self.fail(f'no measurement for {silent:.1f} s after sample {self._run.newest}: {who}')
+        self.fail(f'no measurement for {self._silent:.1f} s after sample {self._run.newest}: {who}')
 
     def _on_trajectory(self, data: bytes) -> None:
         """Take a trajectory in; it is checked in pieces, between which the hover goes on."""
         try:
-            if len(data) > _LONGEST_TRAJECTORY:
-                raise UnreachableError(
-                    f'the message has {len(data)} bytes, it must have at most '
-                    f'{_LONGEST_TRAJECTORY}: give fewer points, they are joined by quintics'
-                )
-            message = _read(data)
-            if message.header.stamp.sec or message.header.stamp.nanosec:
-                raise UnreachableError('header.stamp must be 0: it starts at once')
-            points = [_point(each) for each in message.points]
-            replaces = self._run.propose(message.joint_names, points)
+            replaces = self._run.propose(*trajectory_message.read(data))
         except UnreachableError as error:
             self.get_logger().error(f'trajectory refused: {error}')
         else:
@@ -376,24 +371,11 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         }
         if self._run.left:
             return DiagnosticStatus.WARN, f'left the run: {self._run.left}', facts
-        silent = time.monotonic() - self._seen
-        if silent > _SILENCE:
-            return DiagnosticStatus.WARN, f'no measurement for {silent:.1f} s', facts
+        if self._silent > SILENCE[self.parameters.mode]:
+            return DiagnosticStatus.WARN, f'no measurement for {self._silent:.1f} s', facts
         return DiagnosticStatus.OK, 'running', facts
 
     def spin(self, stop: Callable[[], bool]) -> None:
         """Serve the graph."""
         self.take_realtime_priority()
         super().spin(stop)
-
-
-def _read(data: bytes) -> Any:
-    try:
-        return deserialize_message(data, JointTrajectory)
-    except RuntimeError as error:  # which rclpy's are
-        raise UnreachableError('the message is no trajectory_msgs/JointTrajectory') from error
-
-
-def _point(given: Any) -> Point:
-    time = given.time_from_start.sec + 1e-9 * given.time_from_start.nanosec
-    return Point(time, given.positions, given.velocities, given.accelerations)

@@ -79,31 +79,29 @@ class ReferenceRun:
 
     @property
     def over(self) -> bool:
-        """Whether the stage has got beyond the beginning of END."""
-        sample = self.newest - self._origin
-        return (
-            self.phase == Phase.END
-            and self._timeline is not None
-            and sample > (self._timeline.end or 0)
-        )
+        """Whether the stage has got beyond the beginning of END, or began anew in flight."""
+        if self._timeline is None:
+            return bool(self.left)
+        return self.phase == Phase.END and self.newest - self._origin > (self._timeline.end or 0)
 
     @property
     def ahead(self) -> int:
         """How far it is published beyond the stage's newest sample."""
         return self._origin + self._next - 1 - self.newest
 
-    def observe(self, sequence: int) -> bool:
+    def observe(self, sequence: int, *, silent: bool = False) -> bool:
         """Take note of a measurement; false for one to be left alone.
 
         A number below the newest is another stage's: of one that has taken the place of a stage
-        that stopped, which then begins anew without starting by itself; or, while the platen flies,
-        of a second one, which will find the first and leave.
+        that stopped, which then begins anew without starting by itself; or, while the platen flies
+        and its stage is not ``silent``, of a second one, which will find the first and leave.
         """
         if sequence < self.newest:
-            if not self.grounded:
+            if not (self.grounded or silent):
                 return False
+            self.left = '' if self.grounded else self.left or 'the stage began anew in flight'
             self._timeline, self._next = None, 0
-            self.autostart, self.phase, self.left = False, Phase.REST, ''
+            self.autostart, self.phase = False, Phase.REST
         self.newest = sequence
         self._rest_on()
         return True
