@@ -218,6 +218,21 @@ def test_nothing_hurries_after_the_end_and_a_dead_controller_is_noticed(
     assert 'no measurement for' in graph['reference'].output
 
 
+@pytest.mark.parametrize('end', [signal.SIGKILL, signal.SIGTERM])
+def test_at_rest_one_controller_follows_another(
+    nodes: Nodes, watching: Observer, end: signal.Signals
+) -> None:
+    graph = fly(nodes, LONG, 'autostart:=false')
+    watching.wait(lambda: watching.newest(CONTROLLER_STATE) is not None)
+    samples(watching, 30)
+    graph['controller'].signal(end)
+    graph['controller'].wait()
+    nodes.start('controller', WATCHED)
+    samples(watching, 30)
+    assert watching.call('/reference/lift_off').success
+    watching.wait(lambda: airborne(watching))
+
+
 def test_a_flight_that_has_lost_its_platen_ends(nodes: Nodes, watching: Observer) -> None:
     burden = 'disturbance.constant:=[5000.0, 0.0, 0.0, 0.0, 0.0]'  # more than all motors carry
     graph = fly(nodes, LONG, 'exit_at_end:=true', plant=(burden,))

@@ -31,6 +31,26 @@ def test_lockstep_repeats_the_first_sample_and_waits_for_each_answer() -> None:
     assert (sampling.sequence, sampling.late_samples) == (7, 0)
 
 
+def test_in_lockstep_the_sample_that_waits_at_rest_is_repeated_for_another_controller() -> None:
+    _, node = start(MadeUpStage())
+    node.tick()
+    node.controllers = 1
+    node.answer(currents(0))
+    node.tick()
+    assert node.measured == [0, 1]
+    node.controllers = 2  # one was killed, which the graph does not know yet
+    for _ in range(2):
+        node.tick()
+    assert node.measured == [0, 1, 1, 1]
+    node.answer(currents(1, session=2))
+    node.tick()
+    assert node.measured == [0, 1, 1, 1, 2]
+    node.answer(currents(2, 0.5, session=2))
+    node.controllers = 1
+    node.tick()
+    assert node.measured == [0, 1, 1, 1, 2, 3]  # in flight a controller is waited for
+
+
 def test_a_stage_without_a_first_sample_is_not_left_active() -> None:
     stage = MadeUpStage()
     fine = stage.activate

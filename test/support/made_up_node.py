@@ -91,6 +91,7 @@ class MadeUpNode:
         self.fail = self.failed.append
         self.inbox = Inbox(self.stamped)
         self.subscribers: dict[str, list[str]] = {}
+        self.controllers = 0  # that publish currents
 
     def get_namespace(self) -> str:
         return '/'
@@ -113,7 +114,9 @@ class MadeUpNode:
     ) -> Any:
         assert raw
         self.answer = lambda message: callback(serialize_message(self.stamped(message)))
-        return SimpleNamespace(topic_name='/stage/currents', get_publisher_count=lambda: 0)
+        return SimpleNamespace(
+            topic_name='/stage/currents', get_publisher_count=lambda: self.controllers
+        )
 
     def poll(self, _topic: str, _type: type, _qos: Any, *, raw: bool) -> Inbox:
         assert raw

@@ -27,11 +27,12 @@ S = TypeVar('S', bound=Stage)
 class Sampling(Generic[P, S]):
     """Takes a stage's samples from :meth:`start` to :meth:`stop`; again after another start.
 
-    Lockstep: the first sample is repeated until a controller answers it; from then on each sample
-    waits for the currents with its sequence number. Real time: a sample every sample time, with the
-    newest currents, hence one sample of delay. Whose currents are followed, and from when on, is
-    for the :class:`~maglev_model.contract.controller_watch.ControllerWatch` to say; what it refuses
-    in flight is a fault of the stage.
+    Lockstep: the first sample is repeated until a controller answers it, and at rest the one that
+    waits when controllers came or went; else each waits for the currents with its sequence number.
+    Real time: a sample every sample time, with the newest currents, hence one sample of delay.
+    Whose currents are followed, and from when on, is for the
+    :class:`~maglev_model.contract.controller_watch.ControllerWatch` to say; what it refuses in
+    flight is a fault of the stage.
     """
 
     def __init__(self, node: ManagedNode[P], stage: S) -> None:
@@ -49,6 +50,7 @@ class Sampling(Generic[P, S]):
         self._newest = -1  # sequence of the newest currents that came
         self._publisher = SamplePublisher(node, stage.sample_time, truth=stage.truth() is not None)
         self._answers: Any = None
+        self._controllers = 0  # how many there were when one answered first
         self._pace: Pace = StageClock(stage.sample_time)
         if not stage.paced:
             self._pace = Deadlines(stage.sample_time)
@@ -145,7 +147,8 @@ class Sampling(Generic[P, S]):
             return
         verdict = self._judge(message)
         if message.sequence == self.sequence and verdict is not Verdict.ELSEWHERE:
-            self.answered = True
+            if not self.answered:
+                self.answered, self._controllers = True, self._answers.get_publisher_count()
             if verdict is Verdict.FOLLOWED:
                 self._write(message)
             else:
@@ -159,6 +162,8 @@ class Sampling(Generic[P, S]):
         if not self._ticks:
             return
         waited = time.monotonic() - self._sample_time
+        if not self.stage.flying and self._controllers != self._answers.get_publisher_count():
+            self.answered = False
         if not self.answered:
             self._publisher.watchers.there()  # they match while nobody answers yet
             self._publish()
