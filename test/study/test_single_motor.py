@@ -26,7 +26,7 @@ def test_a_single_motor_needs_its_guides_locked() -> None:
     """What it cannot move must not be free."""
     with pytest.raises(ParameterError, match=r"'guide.locked' leaves z, phi or theta free"):
         build(PlantParameters, {'machine.motors': 1})
-    with pytest.raises(ParameterError, match="'motors' is 2, it must be 1 or 4"):
+    with pytest.raises(ParameterError, match=r"'machine.motors' is 2, it must be 1 or 4"):
         MachineParameters(motors=2)
 
 

@@ -54,13 +54,13 @@ class ModeParameters:
         lengths = len(self.axis), len(self.frequency), len(self.damping), len(self.gain)
         if len(set(lengths)) > 1:
             raise ParameterError(
-                "parameters 'axis', 'frequency', 'damping' and 'gain' of the modes have "
+                "parameters 'modes.axis', 'frequency', 'damping' and 'gain' have "
                 '{}, {}, {} and {} elements, they must have as many'.format(*lengths)
             )
         for name in set(self.axis):
             if len(self.of(name)) > MOST:
                 raise ParameterError(
-                    f"parameter 'axis' names {len(self.of(name))} modes of {name}, "
+                    f"parameter 'modes.axis' names {len(self.of(name))} modes of {name}, "
                     f'an axis has at most {MOST}'
                 )
 

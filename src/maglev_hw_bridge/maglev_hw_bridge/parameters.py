@@ -136,7 +136,10 @@ class FaultParameters:
                     f"'fault.upper[{axis}]' ({high:g})"
                 )
         if self.gap_lower >= self.gap_upper:
-            raise ParameterError("parameter 'fault.gap_lower' must be less than 'fault.gap_upper'")
+            raise ParameterError(
+                f"parameter 'fault.gap_lower' is {self.gap_lower:g} m, it must be less than "
+                f"'fault.gap_upper' ({self.gap_upper:g} m)"
+            )
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -23,13 +23,16 @@ _BY_PHASE = ', by phase a, b, c of motor 1, then of motors 2, 3, 4'
 _BY_ENCODER = ', by encoder: gaps of motors 1..4, x, z'
 
 
-def check_places(what: str, boards: Sequence[int], channels: Sequence[int]) -> None:
-    """Refuse two signals on one channel of a board. Raises ParameterError."""
+def check_places(name: str, boards: Sequence[int], channels: Sequence[int]) -> None:
+    """Refuse two signals on one channel of a board, by the channels' name.
+
+    Raises ParameterError.
+    """
     seen: dict[tuple[int, int], int] = {}
     for index, place in enumerate(zip(boards, channels, strict=True)):
         if place in seen:
             raise ParameterError(
-                f"parameter '{what}.channel' puts elements {seen[place]} and {index} on board "
+                f"parameter '{name}' puts elements {seen[place]} and {index} on board "
                 f'{place[0]}, channel {place[1]}; each needs a channel of its own'
             )
         seen[place] = index
@@ -93,7 +96,7 @@ class EncoderInputParameters:
 
     def __post_init__(self) -> None:
         """Refuse two encoders on one input and directions of 0."""
-        check_places('encoder', self.board, self.channel)
+        check_places('encoder.channel', self.board, self.channel)
         check_signs('encoder.direction', self.direction)
 
 
@@ -196,7 +199,7 @@ class DriveParameters:
 
     def __post_init__(self) -> None:
         """Refuse what each value alone cannot show to be wrong."""
-        check_places('amplifier', self.board, self.channel)
+        check_places('amplifier.channel', self.board, self.channel)
         check_signs('amplifier.sign', self.sign)
         self._check_reach()
         if self.continuous_current > self.peak_current:

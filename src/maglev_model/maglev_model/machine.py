@@ -96,7 +96,7 @@ class MachineParameters:
     def __post_init__(self) -> None:
         """Refuse what each value alone cannot show to be wrong."""
         if self.motors not in (1, 4):
-            raise ParameterError(f"parameter 'motors' is {self.motors}, it must be 1 or 4")
+            raise ParameterError(f"parameter 'machine.motors' is {self.motors}, it must be 1 or 4")
         for small, large in (
             ('gap_min', 'gap_max'),
             ('slot_width', 'slot_pitch'),
@@ -105,7 +105,8 @@ class MachineParameters:
             low, high = getattr(self, small), getattr(self, large)
             if low >= high:
                 raise ParameterError(
-                    f"parameter '{small}' is {low:g} m, it must be less than '{large}' ({high:g} m)"
+                    f"parameter 'machine.{small}' is {low:g} m, it must be less than "
+                    f"'machine.{large}' ({high:g} m)"
                 )
 
     @property

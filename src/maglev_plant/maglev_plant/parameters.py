@@ -56,8 +56,8 @@ class AmplifierParameters:
         """Refuse a continuous current above the peak."""
         if self.continuous_current > self.peak_current:
             raise ParameterError(
-                f"parameter 'continuous_current' is {self.continuous_current:g} A, it must not "
-                f"exceed 'peak_current' ({self.peak_current:g} A)"
+                f"parameter 'amplifier.continuous_current' is {self.continuous_current:g} A, it "
+                f"must not exceed 'amplifier.peak_current' ({self.peak_current:g} A)"
             )
 
 

@@ -182,7 +182,11 @@ class Rig:
             )
         self.steps = math.ceil(parameters.sample_time / _LONGEST_STEP - 1e-9)
         step = parameters.sample_time / self.steps
-        self.stage = stage_arrays(_plant(parameters, step))
+        try:
+            plant = _plant(parameters, step)
+        except ParameterError as error:
+            raise ParameterError(f"of the emulated machine ('emulation.*'): {error}") from error
+        self.stage = stage_arrays(plant)
         self.arrays = _rig_arrays(parameters, step)
         self.stage.effects.by_phases = False  # phases are the rig's
         winding = self.stage.effects.winding
@@ -196,8 +200,10 @@ class Rig:
 
     def _check(self) -> None:
         wiring = self.wiring
-        check_places('emulation.wiring.phase', wiring.phase_board, wiring.phase_channel)
-        check_places('emulation.wiring.encoder', wiring.encoder_board, wiring.encoder_channel)
+        check_places('emulation.wiring.phase_channel', wiring.phase_board, wiring.phase_channel)
+        check_places(
+            'emulation.wiring.encoder_channel', wiring.encoder_board, wiring.encoder_channel
+        )
         check_signs('emulation.wiring.phase_sign', wiring.phase_sign)
         check_signs('emulation.wiring.encoder_direction', wiring.encoder_direction)
 

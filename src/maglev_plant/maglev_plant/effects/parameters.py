@@ -84,7 +84,7 @@ class ModeParameters:
         lengths = {len(self.axis), len(self.frequency), len(self.damping), len(self.gain)}
         if len(lengths) > 1 or len(self.axis) > 16:
             raise ParameterError(
-                "parameters 'axis', 'frequency', 'damping' and 'gain' of the modes have "
+                "parameters 'effects.modes.axis', 'frequency', 'damping' and 'gain' have "
                 f'{len(self.axis)}, {len(self.frequency)}, {len(self.damping)} and '
                 f'{len(self.gain)} elements, they must have as many, at most 16'
             )
