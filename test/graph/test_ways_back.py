@@ -24,7 +24,14 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 
 from maglev_msgs.msg import ControllerState, Reference
-from maglev_node.topics import CONTROLLER_STATE, CURRENTS, DIAGNOSTICS, REFERENCE, TRUE_STATE
+from maglev_node.topics import (
+    CONTROLLER_STATE,
+    CURRENTS,
+    DIAGNOSTICS,
+    REFERENCE,
+    SILENCE,
+    TRUE_STATE,
+)
 
 
 def mode(observer: Observer) -> int:
@@ -119,6 +126,23 @@ def test_emergency_stops_in_flight_and_the_way_back(nodes: Nodes, watching: Obse
         request = ChangeState.Request(transition=Transition(label=name))
         assert watching.ask(client, request).success, name
     watching.wait(lambda: phase(watching) == Reference.REST)
+    assert watching.call('/reference/lift_off').success
+    watching.wait(lambda: airborne(watching))
+
+
+def test_without_measurements_a_lift_off_is_refused(nodes: Nodes, watching: Observer) -> None:
+    """It would begin whenever the stage goes on."""
+    graph = fly(nodes, LONG, 'autostart:=false')
+    watching.wait(lambda: watching.newest(CONTROLLER_STATE) is not None)
+    samples(watching, 30)
+    graph['plant'].signal(signal.SIGSTOP)
+    watching.serve(SILENCE['lockstep'] + 0.1)
+    answer = watching.call('/reference/lift_off')
+    assert not answer.success
+    assert 'lift-off refused: no measurement for 2.' in answer.message
+    graph['plant'].signal(signal.SIGCONT)
+    samples(watching, 300)
+    assert landed_without_current(watching)
     assert watching.call('/reference/lift_off').success
     watching.wait(lambda: airborne(watching))
 

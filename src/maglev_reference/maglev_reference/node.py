@@ -151,12 +151,17 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         """Time without a measurement [s]."""
         return time.monotonic() - self._seen
 
+    @property
+    def _is_silent(self) -> bool:
+        """Whether the stage is taken for stopped."""
+        return self._silent > SILENCE[self.parameters.mode]
+
     def _take_measurement(self) -> bool:
         """Take the newest measurement; false when there is none, or one to be left alone."""
         news = False
         for message in self._measurements.take(1):
-            silent = self._silent > SILENCE[self.parameters.mode]
-            if self._run.observe(message.sequence, silent=silent) and self._runs_alike(message):
+            observed = self._run.observe(message.sequence, silent=self._is_silent)
+            if observed and self._runs_alike(message):
                 news, self._measured, self._seen = True, message, time.monotonic()
         return news
 
@@ -289,10 +294,13 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
             if self._run.phase == Phase.END and self.parameters.exit_at_end:
                 self._end()
             return
+        self.fail(self._stopped())
+
+    def _stopped(self) -> str:
         who = 'the stage, or the controller it waits for, has stopped'
         if self._measurements.raw.publisher_count() == 0:
             who = 'the stage is gone'
-        self.fail(f'no measurement for {self._silent:.1f} s after sample {self._run.newest}: {who}')
+        return f'no measurement for {self._silent:.1f} s after sample {self._run.newest}: {who}'
 
     def _on_trajectory(self, data: bytes) -> None:
         """Take a trajectory in; it is checked in pieces, between which the hover goes on."""
@@ -331,6 +339,8 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         reason, _ = self._run.obstacle()
         if not self._run.started:
             return False, self._waiting_for()
+        if self._is_silent:  # or it would lift off when the stage goes on, be that much later
+            return False, f'lift-off refused: {self._stopped()}'
         if reason:
             return False, f'lift-off refused: {self._way_back(reason)}'
         if not self._run.lift_off(self._position()):
@@ -371,7 +381,7 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         }
         if self._run.left:
             return DiagnosticStatus.WARN, f'left the run: {self._run.left}', facts
-        if self._silent > SILENCE[self.parameters.mode]:
+        if self._is_silent:
             return DiagnosticStatus.WARN, f'no measurement for {self._silent:.1f} s', facts
         return DiagnosticStatus.OK, 'running', facts
 
