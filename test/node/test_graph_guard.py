@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from maglev_node import graph_guard
-from maglev_node.graph_guard import GraphGuard
+from maglev_node.graph_guard import GraphGuard, node_of
 from maglev_node.node import NodeError
 from maglev_node.place import Place
 
@@ -79,6 +79,12 @@ def test_what_another_publishes_is_not_claimed() -> None:
     node.publishers = [OTHER]
     with pytest.raises(NodeError, match="/stage/currents is already published by '/other'"):
         GraphGuard(node).claim('stage/currents', 'controller')
+
+
+def test_a_node_is_named_in_full_once_its_name_is_discovered() -> None:
+    nested = SimpleNamespace(node_namespace='/left', node_name='other')
+    named = [node_of(each) for each in (OTHER, nested, NAMELESS)]  # type: ignore[arg-type]
+    assert named == ['/other', '/left/other', '']
 
 
 def test_what_a_nameless_one_publishes_is_not_claimed_and_its_name_is_waited_for(

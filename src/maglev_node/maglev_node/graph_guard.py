@@ -28,6 +28,13 @@ _REMINDER = 5.0  # between two lines about who is waited for [s]
 _NAMELESS = '_NODE_NAME_UNKNOWN_'  # to the middleware, whose publishers are discovered before names
 
 
+def node_of(endpoint: TopicEndpointInfo) -> str:
+    """The full name of the node that a publisher or subscription is of; '' until discovered."""
+    if endpoint.node_name == _NAMELESS:
+        return ''
+    return f'{endpoint.node_namespace.rstrip("/")}/{endpoint.node_name}'
+
+
 class GraphGuard:
     """Keeps a node the only publisher of the topic it claims.
 
@@ -108,10 +115,9 @@ class GraphGuard:
 
     def _taken(self, who: TopicEndpointInfo | None = None) -> str:
         whom = 'a process on this machine'
-        if who is not None and who.node_name == _NAMELESS:
-            whom = 'a node whose name is not discovered yet'
-        elif who is not None:
-            whom = f"'{who.node_namespace.rstrip('/')}/{who.node_name}'"
+        if who is not None:
+            name = node_of(who)
+            whom = f"'{name}'" if name else 'a node whose name is not discovered yet'
         return (
             f'{self._node.resolve_topic_name(self._topic)} is already published by {whom}: there is'
             f' another {self._kind} on this graph; stop it, or use another namespace or'

@@ -20,7 +20,7 @@ from maglev_model.contract.wire import KEPT
 from maglev_model.geometry import outputs_of_gaps
 from maglev_model.parameters import ParameterError, parameter
 from maglev_msgs.srv import Step
-from maglev_node.graph_guard import GraphGuard, Watchers
+from maglev_node.graph_guard import GraphGuard, Watchers, node_of
 from maglev_node.mode_check import StageCheck
 from maglev_node.node import MaglevNode, SourceParameters
 from maglev_node.samples import SampleQueue, SampleWriter
@@ -249,10 +249,10 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         """A reason, and the services to call for a lift-off."""
         _, calls = self._run.obstacle()
         publishers = self.get_publishers_info_by_topic(CONTROLLER_PROGRESS)
-        if not publishers:
-            return f'{reason}: nobody publishes {self._states.raw.topic}'
-        who = f'{publishers[0].node_namespace.rstrip("/")}/{publishers[0].node_name}'
-        services = [f'{who}/{call}' for call in calls]
+        controller = next(filter(None, map(node_of, publishers)), '')
+        if not controller:
+            return f'{reason}: nobody known publishes {self._states.raw.topic}'
+        services = [f'{controller}/{call}' for call in calls]
         services.append(self.resolve_service_name('~/lift_off'))
         return f'{reason}: call {", then ".join(services)}'
 
