@@ -74,6 +74,8 @@ check_place() {
   for place in "$root" "$root"/{.venv,.cache,build,install}; do
     [[ ! -e $place || -w $place ]] || fail_to_write "$place"
   done
+  [[ ,$(findmnt -no OPTIONS -T "$root" 2>/dev/null), != *,noexec,* ]] ||
+    fail "$root lies on a mount with noexec, where no program can be started: clone elsewhere"
   command -v flock >/dev/null || fail "flock is missing: $(install_hint util-linux util-linux-core)"
   [[ $branch == native ]] || check_wheels_machine
 }

@@ -164,8 +164,9 @@ make_messages() {
 }
 
 compile() {
-  local old
+  local old said=$log.$BASHPID
   warm_up
+  ! disk_is_full "$(<"$said")" || return
   stamp "$cache/numba/$sources/.stamp" "$build_key"
   # Of older sources, keep two for runs that still use them.
   for old in $(cd "$cache/numba" && ls -t | grep -vx current | tail -n +4); do

@@ -56,7 +56,7 @@ ended() { # JOB CODE
 }
 
 forget() { # JOB
-  { printf '\n== %s\n' "${titles[$1]}" && cat -- "$log.$1" 2>/dev/null || true; } >>"$log"
+  { printf '\n== %s\n' "${titles[$1]}" && cat -- "$log.$1" || true; } >>"$log" 2>/dev/null
   unset "titles[$1]" "begun[$1]"
   rm -f -- "$log.$1"
 }
@@ -95,18 +95,28 @@ interrupted() { # SIGNAL CODE
   exit "$2"
 }
 
+# Whether the disk is full: a step whose words go to that disk cannot always say so.
+disk_is_full() { # OUTPUT
+  local full=''
+  head -c 65536 /dev/zero >"$log.try" || full=yes
+  rm -f -- "$log.try"
+  [[ -n $full || $1 =~ 'No space left on device'|'Errno 28' ]]
+} 2>/dev/null
+
 # End the set-up with the most telling line of what the step said.
 explain() { # TITLE OUTPUT
   [[ ! -t 2 ]] || printf '\r\e[K' >&2
   local cause network='NewConnectionError|NameResolutionError|Temporary failure in name'
-  network+='|Network is unreachable|Connection refused|ConnectTimeout|ReadTimeout|ProxyError'
+  network+='|Network is unreachable|Connection refused|ConnectTimeout|ReadTimeout'
   network+='|SSLError|Connection aborted|connection broken'
-  if grep -qE 'No space left on device|Errno 28' <<<"$2"; then
-    cause="no space left on the disk of $root or of ${TMPDIR:-/tmp}: make room"
-  elif grep -qF 'Disk quota exceeded' <<<"$2"; then
+  if [[ $2 == *'Disk quota exceeded'* ]]; then
     cause='the disk quota is used up: make room'
+  elif disk_is_full "$2"; then
+    cause="no space left on the disk of $root or of ${TMPDIR:-/tmp}: make room"
   elif grep -qE ' Killed  |Killed signal' <<<"$2"; then
     cause='the system has killed it, as where memory runs out: end other programs'
+  elif [[ $2 == *ProxyError* ]]; then
+    cause='pip cannot reach the proxy that https_proxy or its settings name: correct that'
   elif grep -qE "$network" <<<"$2"; then
     cause='no network, pip cannot reach its package index: connect, or set https_proxy'
   else

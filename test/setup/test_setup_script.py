@@ -169,6 +169,12 @@ def test_a_folder_name_ros_cannot_build_in(
 
 
 @needs_wheels
+def test_a_mount_where_nothing_can_be_started(machine: Machine) -> None:
+    machine.script('findmnt', 'echo rw,nosuid,noexec,relatime')
+    assert 'on a mount with noexec, where no program can be started' in machine.refusal()
+
+
+@needs_wheels
 def test_a_folder_name_ros_can_build_in(machine: Machine, tmp_path: Path) -> None:
     (machine.bin / 'make').unlink()
     machine.root = machine.root.rename(tmp_path / 'Gr-1.2_a+b@c~d')
@@ -237,13 +243,49 @@ def test_a_venv_of_which_a_part_is_deleted_is_made_anew_and_says_so(
 
 
 @needs_wheels
-def test_no_network(machine: Machine) -> None:
+@pytest.mark.parametrize(
+    ('settings', 'words'),
+    [
+        (
+            {'PIP_INDEX_URL': 'http://127.0.0.1:9/simple'},
+            'no network, pip cannot reach its package',
+        ),
+        (
+            {'PIP_INDEX_URL': 'https://index.invalid/', 'PIP_PROXY': 'http://127.0.0.1:9'},
+            'pip cannot reach the proxy that https_proxy or its settings name',
+        ),
+    ],
+)
+def test_no_network(machine: Machine, settings: dict[str, str], words: str) -> None:
     for name in ('python3', 'sleep'):
         (machine.bin / name).unlink(missing_ok=True)
         (machine.bin / name).symlink_to(shutil.which(name, path='/usr/bin:/bin') or '')
-    code, lines = machine.setup(
-        PIP_CONFIG_FILE='/dev/null', PIP_INDEX_URL='http://127.0.0.1:9/simple', PIP_RETRIES='0'
-    )
+    code, lines = machine.setup(PIP_CONFIG_FILE='/dev/null', PIP_RETRIES='0', **settings)
     assert code == 1
-    assert 'no network, pip cannot reach its package index' in lines[-1]
+    assert words in lines[-1]
     assert not (machine.root / '.venv').exists()
+
+
+@needs_wheels
+def test_what_a_full_disk_kept_from_being_compiled_is_not_done(machine: Machine) -> None:
+    functions = (ROOT / 'setup' / 'install.sh').read_text().removesuffix('\nmain\n')
+    compiling = machine.root / 'setup' / 'compile.sh'
+    compiling.write_text(f"""{functions}
+choose_branch
+find_keys
+mkdir -p "$cache/numba/$sources"
+: >"$log"
+warm_up() {{ echo 'OSError: [Errno 28] No space left on device'; echo 'not compiled'; }}
+step compiling compile
+""")
+    machine.tool('sleep')
+    done = subprocess.run(
+        [machine.bin / 'bash', compiling],
+        env={'PATH': str(machine.bin)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert 'setup: compiling failed: no space left on the disk of ' in done.stderr
+    assert not list((machine.root / '.cache' / 'numba').rglob('.stamp'))

@@ -84,6 +84,19 @@ def test_a_step_that_the_system_kills_is_explained(tmp_path: Path) -> None:
     assert lines[-1].startswith('setup: wrong failed: the system has killed it, as where memory')
 
 
+def test_a_step_whose_words_the_disk_does_not_take_is_explained(tmp_path: Path) -> None:
+    limited = """mute() { until [[ -s $root/pid ]]; do sleep 0.05; done; yes | head -c 99999; }
+    begin long endless
+    trap '' XFSZ
+    ulimit -f 8
+    step wrong mute
+    """
+    code, lines = Steps(tmp_path, limited).end(tmp_path)
+    assert code == 1
+    assert lines[2].startswith('setup: wrong failed: no space left on the disk of ')
+    assert len(lines) == 3
+
+
 @pytest.mark.parametrize(('signal_', 'code'), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_interrupted_no_step_goes_on(tmp_path: Path, signal_: signal.Signals, code: int) -> None:
     steps = Steps(tmp_path, 'begin long endless; finish')
