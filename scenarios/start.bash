@@ -44,6 +44,13 @@ export MAGLEV_SETUP
 # What else the caller's Python finds and does is for his own programs.
 packages=("$root"/.venv/lib/python3*/site-packages)
 export PYTHONPATH=${packages[0]}:$PYTHONPATH
-unset PYTHONWARNINGS PYTHONINSPECT
+unset PYTHONWARNINGS PYTHONINSPECT PYTHONIOENCODING
+export PYTHONUTF8=1
+# Every node warns of it; the variables that came for it say the same.
+if [[ ${ROS_LOCALHOST_ONLY:-} == 1 ]]; then
+  export ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST
+  unset ROS_STATIC_PEERS
+fi
+unset ROS_LOCALHOST_ONLY
 # -S: the packages of .venv take longer to find than all else, and are only needed for overlays.
 exec "${held[@]}" python -S "$root/scenarios" "$@"

@@ -20,6 +20,7 @@ PATIENCE = {signal.SIGTERM: 8.0, signal.SIGINT: 3.0, signal.SIGKILL: 3.0}
 
 Of SIGTERM, one that does not listen yet ends without a word; Python tells of SIGINT by a traceback.
 """
+SHARED_MEMORY = '/dev/shm'
 ENVIRONMENT = {
     'PYTHONUNBUFFERED': '1',
     'RCUTILS_COLORIZED_OUTPUT': '0',
@@ -97,12 +98,24 @@ def run_to_end(command: Sequence[str], signals: Signals, log: Path | None = None
         process.stop(signals.pause)
 
 
+def why_killed(code: int | None) -> str:
+    """What the system ended a program for without a word of its own; empty where nobody knows.
+
+    The tracing library of ROS takes pages of shared memory when a node starts, and has a bus error
+    where none is free.
+    """
+    if code != 128 + signal.SIGBUS or not os.path.isdir(SHARED_MEMORY):
+        return ''
+    full = not shutil.disk_usage(SHARED_MEMORY).free
+    return f'{SHARED_MEMORY} is full: remove what ended programs have left there' if full else ''
+
+
 def last_words(log: Path) -> str:
-    """The line of a log that says why its program ended; empty when there is none."""
+    """The line of a log that says why its program ended, uncoloured; empty when there is none."""
     try:
         text = log.read_text(errors='replace')
     except OSError:
         return ''
-    lines = [line for line in text.splitlines() if line.strip()]
+    lines = [line for line in re.sub(r'\033\[[\d;]*m', '', text).splitlines() if line.strip()]
     reasons = [line for line in lines if re.search('error|fatal|refused', line, re.IGNORECASE)]
     return (reasons or lines or [''])[-1]

@@ -12,7 +12,7 @@ from runner.folder import make_folder, say_where, why_unwritable
 from runner.graph import START_ORDER, STOP_ORDER, Flight
 from runner.logs import NodeLog
 from runner.overlays import check_overlay
-from runner.process import Process, last_words, program, run_to_end
+from runner.process import Process, last_words, program, run_to_end, why_killed
 from runner.signals import Signals
 
 NO_VISER = 3
@@ -160,7 +160,7 @@ class Run:
         )
         if code:
             tell = say if code == NO_VISER else complain
-            tell(f'{self._name}: no replay: {last_words(log)}')
+            tell(f'{self._name}: no replay: {last_words(log).removeprefix("replay: error: ")}')
 
     def _report(self, analyze: Sequence[str]) -> bool:
         log, report = self._log('analyze'), self._out / 'report.html'
@@ -175,7 +175,7 @@ class Run:
         return True
 
     def _last_words(self, node: str) -> str:
-        words = self._logs[node].last_words()
+        words = why_killed(self._nodes[node].code) or self._logs[node].last_words()
         return f': {words}' if words else ''
 
     def _log(self, node: str) -> Path:

@@ -70,3 +70,19 @@ def test_what_the_callers_python_finds_and_does_is_no_matter(tree: Tree) -> None
     assert code == 0
     assert output.startswith(f'{packages}:')
     assert output.endswith(':/of/the/caller none none\n')
+
+
+def test_a_terminal_of_another_encoding_stops_no_node(tree: Tree) -> None:
+    tree.executable('maglev_study', 'compare', "#!/usr/bin/env python3\nprint('\\u00b5m')\n")
+    told = 'PYTHONUTF8=0 PYTHONIOENCODING=ascii "${0%/*}/compare.sh"'
+    assert called(tree, told, LC_ALL='C') == (0, 'µm\n')
+
+
+@pytest.mark.parametrize(('only', 'told'), [('1', 'LOCALHOST none none'), ('0', 'SUBNET a;b none')])
+def test_what_ros_wants_otherwise_today_is_told_so(tree: Tree, only: str, told: str) -> None:
+    names = ('AUTOMATIC_DISCOVERY_RANGE', 'STATIC_PEERS', 'LOCALHOST_ONLY')
+    said = ' '.join(f'"${{ROS_{name}-none}}"' for name in names)
+    tree.executable('maglev_study', 'compare', f'#!/bin/sh\necho {said}\n')
+    given = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET', 'ROS_STATIC_PEERS': 'a;b'}
+    code, output = called(tree, '"${0%/*}/compare.sh"', ROS_LOCALHOST_ONLY=only, **given)
+    assert (code, output) == (0, f'{told}\n')

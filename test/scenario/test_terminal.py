@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,10 @@ from runner import logs, process
     [
         ('[INFO] up\nFATAL: no encoder\nit ends\n\n', 'FATAL: no encoder'),
         ('[INFO] up\nlast\n', 'last'),
+        (
+            '\033[37;1m12:00 [\033[31;1mRTPS Error\033[m] no port\033[m\n',
+            '12:00 [RTPS Error] no port',
+        ),
         ('\n', ''),
     ],
 )
@@ -22,6 +27,15 @@ def test_last_words(tmp_path: Path, log: str, words: str) -> None:
     (tmp_path / 'log').write_text(log)
     assert process.last_words(tmp_path / 'log') == words
     assert process.last_words(tmp_path / 'none') == ''
+
+
+def test_a_bus_error_is_of_full_shared_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(process, 'SHARED_MEMORY', '/proc')  # which has no free page either
+    assert process.why_killed(128 + signal.SIGBUS).startswith('/proc is full: remove')
+    assert process.why_killed(128 + signal.SIGSEGV) == ''
+    for other in ('/', '/nowhere'):
+        monkeypatch.setattr(process, 'SHARED_MEMORY', other)
+        assert process.why_killed(128 + signal.SIGBUS) == ''
 
 
 def test_warnings_of_every_node_are_shown_once(tree: Tree) -> None:
