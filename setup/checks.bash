@@ -96,13 +96,13 @@ check_wheels_machine() {
 # Sets python, the path of an interpreter that can carry the environment, and python_version.
 check_python() {
   local name answer best='missing this machine has no Python'
-  local names=(python3 python3.12 python3.11 python3.13 python3.10)
-  [[ $1 == wheels ]] || names=(python3 /usr/bin/python3)
+  local names=(python3 /usr/bin/python3)
+  # All on PATH: the first of a name may be a shim of pyenv for a version that is not there.
+  [[ $1 != wheels ]] ||
+    mapfile -t names < <(type -aP python3 python3.12 python3.11 python3.13 python3.10)
   for name in "${names[@]}"; do
-    command -v "$name" >/dev/null || continue
-    answer=$(PYTHONNOUSERSITE=1 \
-      bash -c "${ros_setup:+. $ros_setup >/dev/null;} exec $name $root/setup/probe.py $1" \
-      2>/dev/null) || continue
+    answer=$(PYTHONNOUSERSITE=1 bash -c "${ros_setup:+. $ros_setup >/dev/null; } exec \"\$@\"" - \
+      "$name" "$root/setup/probe.py" "$1" 2>/dev/null) || continue
     if [[ $answer == 'ok '* ]]; then
       read -r _ python_version python <<<"$answer"
       return

@@ -113,6 +113,16 @@ def test_a_second_python_will_do(machine: Machine) -> None:
 
 
 @needs_wheels
+def test_a_python_behind_a_shim_of_pyenv_will_do(machine: Machine, tmp_path: Path) -> None:
+    shims = tmp_path / 'of pyenv'
+    shims.mkdir()
+    (shims / 'python3').write_text('#!/bin/bash\nexit 127\n')
+    (shims / 'python3').chmod(0o755)
+    (machine.bin / 'make').unlink()
+    assert 'missing: make' in machine.refusal(PATH=f'{shims}:{machine.bin}')
+
+
+@needs_wheels
 @pytest.mark.parametrize(
     ('manager', 'words'),
     [
