@@ -7,6 +7,7 @@ import csv
 import os
 import re
 import struct
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -223,8 +224,11 @@ def test_a_data_frame_in_one_line(bag: Path, whole: Table) -> None:
 @pytest.mark.parametrize(
     ('library', 'why'),
     [
-        ('pandas', 'read needs pandas: pip install pandas'),
-        ('pyarrow', "the format parquet needs pyarrow: pip install 'pyarrow<26'"),
+        ('pandas', f'read needs pandas: {sys.executable} -m pip install pandas'),
+        (
+            'pyarrow',
+            f"the format parquet needs pyarrow: {sys.executable} -m pip install 'pyarrow<26'",
+        ),
     ],
 )
 def test_a_library_that_is_not_there_is_named(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import shlex
+import sys
 from collections.abc import Iterator
 
 
@@ -14,10 +16,12 @@ class MissingLibraryError(ImportError):
 def needed(name: str, what: str, versions: str = '') -> Iterator[None]:
     """Import a library that only ``what`` needs, in some ``versions``, ``>=2,<3``.
 
-    Raises :class:`MissingLibraryError` naming it.
+    Raises :class:`MissingLibraryError` naming it, and the Python that lacks it: `pip` alone may be
+    another's.
     """
     try:
         yield
     except ImportError as error:
         wanted = f"'{name}{versions}'" if versions else name
-        raise MissingLibraryError(f'{what} needs {name}: pip install {wanted}') from error
+        how = f'{shlex.quote(sys.executable)} -m pip install {wanted}'
+        raise MissingLibraryError(f'{what} needs {name}: {how}') from error
