@@ -100,7 +100,7 @@ disk_is_full() { # OUTPUT
   local full=''
   head -c 65536 /dev/zero >"$log.try" || full=yes
   rm -f -- "$log.try"
-  [[ -n $full || $1 =~ 'No space left on device'|'Errno 28' ]]
+  [[ -n $full || $1 == *'No space left on device'* || $1 == *'Errno 28'* ]]
 } 2>/dev/null
 
 # End the set-up with the most telling line of what the step said.
