@@ -7,8 +7,10 @@ import itertools
 import numpy as np
 import pytest
 
+from maglev_hw_bridge.faults import consequence_of_cut
 from maglev_hw_bridge.landing import Landing, impact_of_cut, impacts_of_cut
 from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.sensing.guard import Guard
 from maglev_model.axes import PHI, THETA, X, Z
 from maglev_model.parameters import build
 
@@ -110,3 +112,26 @@ def test_what_is_almost_down_may_hardly_tilt_or_turn(
         rate[axis] = way * share * (tilt - 5e-4) / 0.01 if turning else 0.0
         landing.step(place, rate, REST)
         assert landing.astray == (share > 1.0 and not (turning and above > 2e-4))
+
+
+@pytest.mark.parametrize('axis', [PHI, THETA])
+@pytest.mark.parametrize(
+    ('turning', 'told'),
+    [
+        (0.0, ['lower stop at about 0.0']),
+        (0.01, ['lower stop at about 0.0']),
+        (-0.3, ['upper stop at about 0.4', 'lower stop at about 0.0']),
+        (0.3, ['upper stop at about 0.4', 'lower stop at about 0.0']),
+    ],
+)
+def test_what_turns_may_rise_though_it_hangs_near_its_lower_stop(
+    axis: int, turning: float, told: list[str]
+) -> None:
+    """An amplifier that was stuck on has thrown it over the stop's edge: told as it may end."""
+    guard = Guard(PARAMETERS)
+    guard.arrays.position[:] = [PARAMETERS.machine.gap_max - 1e-4, 0.0, 0.0, 0.0, 0.0]
+    guard.arrays.rate[axis] = turning
+    parts = consequence_of_cut(PARAMETERS, guard).removeprefix('; the platen strikes the ')
+    found = parts.split(' or the ')
+    assert len(found) == len(told)
+    assert all(one.startswith(start) for one, start in zip(found, told, strict=True)), parts

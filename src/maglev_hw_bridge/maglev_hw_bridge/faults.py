@@ -79,10 +79,16 @@ def overrun_fault(late: float) -> tuple[str, str]:
 
 
 def consequence_of_cut(parameters: BridgeParameters, watched: Guard) -> str:
-    """What to add to the reason of a fault that cuts the currents in flight."""
-    state = watched.arrays
-    impacts = impacts_of_cut(parameters, state.position[0], state.rate[0])
-    parts = [f'the {stop} stop at about {speed:.2f} m/s' for stop, speed in impacts.items()]
+    """What to add to the reason of a fault that cuts the currents in flight.
+
+    What turns may rise with its fastest corner, and past the balance where it else would fall.
+    """
+    y, rate = watched.arrays.position[0], watched.arrays.rate
+    turning = parameters.machine.radius * float(np.max(np.abs(rate[3:])))
+    impacts = impacts_of_cut(parameters, y, rate[0] - turning)
+    impacts |= impacts_of_cut(parameters, y, rate[0])
+    hardest = sorted(impacts.items(), key=lambda one: -one[1])
+    parts = [f'the {stop} stop at about {speed:.2f} m/s' for stop, speed in hardest]
     return f'; the platen strikes {" or ".join(parts)}'
 
 
