@@ -17,7 +17,7 @@ from maglev_study.faults.fly import Scenario
 from maglev_study.faults.kinds import Fault
 from maglev_study.faults.machines import PLAIN, believed
 
-ROUGH = believed(Path(__file__).parents[3] / 'params' / 'rough.yaml')
+ROUGH = believed(Path(__file__).resolve().parents[3] / 'params' / 'rough.yaml')
 
 
 @pytest.mark.parametrize(
