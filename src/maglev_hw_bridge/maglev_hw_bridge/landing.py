@@ -38,11 +38,9 @@ _CARRY = np.array([0.0, -2.0, 2.0, -1.0, 1.0])
 x and z come first: along them the platen runs off to a stop 50 mm away, in a tilt to one 2 mm away.
 """
 
-ASKEW, SOON = 8e-4, 0.01
-"""What is, or soon will be, so far tilted off its way near the lower stop is pulled [rad], [s]."""
-
 _PATIENCE = 2.0  # times as far x and z may be off their way where a cut would throw it up
-_SOFT = 2e-4  # so near its stop what tilts is not waited for [m]
+_SOFT = 2e-4  # so near its stop what turns is not waited for [m]
+_TURNING = 0.08  # that fast it is pulled over the stop's edge [rad/s]
 _TILT = 0.95  # share of the attraction that tilts may take there
 _BRAKING_UPWARD = 0.1  # of y [s]
 _SEATED = 5e-5  # so near the lower stop a cut is soft [m]
@@ -110,10 +108,9 @@ def land(block: Block, position: FloatArray, rate: FloatArray, disturbance: Floa
             )
             target = landing.aim + left
         patience = _PATIENCE if _ACROSS[axis] and thrown_up else 1.0
-        off = abs(target - position[axis])
-        if off > patience * landing.stray[axis]:
+        if abs(target - position[axis]) > patience * landing.stray[axis]:
             landing.astray = True
-        if down and axis >= PHI and off + SOON * abs(velocity - rate[axis]) > ASKEW:
+        if down and axis >= PHI and abs(velocity - rate[axis]) > _TURNING:
             landing.astray = True
         wanted[axis] = (
             acceleration

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from maglev_hw_bridge.landing import ASKEW, LEAST_ATTRACTION, SOON
+from maglev_hw_bridge.landing import LEAST_ATTRACTION
 from maglev_hw_bridge.mode import Mode
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.sensing.observer import SUPPORT
@@ -33,6 +33,7 @@ _MOST_PUSH = -7.0  # a platen 10 % heavier, with magnets 10 % weaker, rises at a
 _MOVED = 1.5e-5  # what has risen by this has left its stop [m]
 
 _TILT = 5e-4  # more is wrong in the air [rad]
+_ASKEW, _SOON = 8e-4, 0.01  # what is, or soon will be, so far tilted is pulled [rad], [s]
 
 
 class Lift:
@@ -133,7 +134,7 @@ class Lift:
         gaps = stage.read().gap
         self._counted |= gaps != self._gaps
         self._gaps[:] = gaps
-        soon = np.abs(watched.position[3:]) + SOON * np.abs(watched.rate[3:])
-        if stage.mode is Mode.FOLLOWING and np.max(soon) > ASKEW:
+        soon = np.abs(watched.position[3:]) + _SOON * np.abs(watched.rate[3:])
+        if stage.mode is Mode.FOLLOWING and np.max(soon) > _ASKEW:
             stage.cut_askew()
         return float(np.mean(gaps))
