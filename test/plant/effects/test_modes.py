@@ -60,7 +60,6 @@ def test_a_tilting_mode_shows_in_the_gaps_and_not_in_the_true_state() -> None:
 
 
 def test_lists_of_different_lengths_are_refused() -> None:
-    with pytest.raises(
-        ParameterError, match="'effects.modes.axis', 'frequency', 'damping' and 'gain'"
-    ):
+    told = r"'effects\.modes\.axis', 'frequency', 'damping' and 'gain'"
+    with pytest.raises(ParameterError, match=told):
         ideal_stage(effects__modes__gain=(0.1, 0.2))
