@@ -15,7 +15,6 @@ NODES = {
     'maglev_plant.node',
     'maglev_reference.executables',
     'maglev_reference.node',
-    'maglev_reference.trajectory_message',
     'maglev_view.executables',
     'maglev_view.messages',
     'maglev_view.node',

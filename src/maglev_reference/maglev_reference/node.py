@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.serialization import deserialize_message
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
@@ -33,12 +34,12 @@ from maglev_node.topics import (
     reference_qos,
     sample_qos,
 )
-from maglev_reference import trajectory_message
 from maglev_reference.accuracy import summary, warnings
 from maglev_reference.check import UnreachableError
 from maglev_reference.parameters import ReferenceParameters
 from maglev_reference.run import ReferenceRun, samples_ahead
 from maglev_reference.timeline import Timeline
+from maglev_reference.trajectory_message import check_length, joints_and_points
 
 _LOOK_PERIOD = 0.25  # between two looks at the graph while the stage is flown [s]
 _MOST_AHEAD = 800  # samples; a controller holds 1024
@@ -305,7 +306,8 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
     def _on_trajectory(self, data: bytes) -> None:
         """Take a trajectory in; it is checked in pieces, between which the hover goes on."""
         try:
-            replaces = self._run.propose(*trajectory_message.read(data))
+            check_length(len(data))
+            replaces = self._run.propose(*joints_and_points(_read(data)))
         except UnreachableError as error:
             self.get_logger().error(f'trajectory refused: {error}')
         else:
@@ -389,3 +391,10 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         """Serve the graph."""
         self.take_realtime_priority()
         super().spin(stop)
+
+
+def _read(data: bytes) -> Any:
+    try:
+        return deserialize_message(data, JointTrajectory)
+    except RuntimeError as error:  # which rclpy's are
+        raise UnreachableError('the message is no trajectory_msgs/JointTrajectory') from error
