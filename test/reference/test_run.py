@@ -59,6 +59,13 @@ def test_an_answered_sample_counts_though_its_measurement_was_not_seen(answered,
     assert run.newest == 1000
 
 
+def test_what_is_answered_later_shows_that_the_stage_runs():
+    run = run_at(1000)
+    answers = [1001, 1002, 1002, 17, 18]  # the stage begins anew before the last two
+    told = [run.observe_controller(Mode.REGULATING, sequence) for sequence in answers]
+    assert told == [True, True, False, False, True]
+
+
 def flying_at(sequence):
     """Its lift-off is published, and the stage has got there."""
     run = run_at(sequence)

@@ -133,7 +133,8 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
     def _poll(self) -> None:
         """Take what is new, and publish what is due."""
         for state in self._states.take(1):
-            self._run.observe_controller(Mode(state.mode), state.sequence)
+            if self._run.observe_controller(Mode(state.mode), state.sequence):
+                self._seen = time.monotonic()
         news = self._take_measurement()
         if self.parameters.exit_at_end and self._run.over:
             self._end()
@@ -264,9 +265,8 @@ class ReferenceNode(MaglevNode[ReferenceNodeParameters]):
         due = self._run.due(slowly=slowly)
         if due is None or self._measured is None:
             return
-        first, block = due
         self._published = time.monotonic()
-        message = self._message
+        (first, block), message = due, self._message
         stage_time = self._measured.stamp
         period = round(1e9 * self.parameters.sample_time)
         for row in range(len(block.phase)):

@@ -134,9 +134,14 @@ class ReferenceRun:
         self._timeline = timeline
         self._origin = self.newest
 
-    def observe_controller(self, mode: Mode, sequence: int) -> None:
-        """Take note of what the controller did at a sample."""
+    def observe_controller(self, mode: Mode, sequence: int) -> bool:
+        """Take note of what the controller did at a sample; whether that shows that the stage runs.
+
+        It does where another stage's measurements cover all that is heard of it.
+        """
+        runs = sequence > self._answered
         self.controller, self._answered = mode, sequence
+        return runs
 
     def obstacle(self) -> tuple[str, tuple[str, ...]]:
         """Why the controller would not follow a lift-off, and its services that change that."""
