@@ -9,6 +9,8 @@ from contextlib import contextmanager
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from maglev_node.leaving import deafen
+
 _begun: float | None = None  # when, in this process [s]
 
 
@@ -30,6 +32,9 @@ def discovering(name: str) -> Iterator[None]:
     _begun = time.monotonic()
     try:
         yield
+    except Exception:
+        deafen()  # it may be the last
+        raise
     finally:
         node.destroy_node()
 
