@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import nullcontext
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -16,6 +17,7 @@ import pytest
 from rclpy.duration import Duration
 
 from maglev_node import process
+from maglev_node.leaving import deliver
 from maglev_node.node import NodeError
 from maglev_node.signals import listen
 from maglev_node.stage_node import StageNode
@@ -185,7 +187,7 @@ def test_who_acknowledges_nothing_is_waited_for_once_and_not_by_each_node(
         waited.append(1e-9 * longest.nanoseconds)
         time.sleep(waited[-1])
 
-    monkeypatch.setattr(process, '_DELIVERY_TIME', 0.1)
+    monkeypatch.setattr(process, 'deliver', partial(deliver, at_most=0.1))
     nodes = [Node(send(signal.SIGINT), lambda: True) for _ in range(2)]
     for node in nodes:
         node.publishers = (SimpleNamespace(wait_for_all_acked=wait),) * 2

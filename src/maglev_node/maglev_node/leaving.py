@@ -1,4 +1,4 @@
-"""How a process leaves the graph without its middleware blocking."""
+"""How a process leaves the graph: what it said is heard, and its middleware does not block."""
 
 from __future__ import annotations
 
@@ -8,10 +8,13 @@ import stat
 import struct
 import time
 from array import array
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from fcntl import ioctl
 from termios import FIONREAD
+
+from rclpy.duration import Duration
+from rclpy.publisher import Publisher
 
 _DROP_ALL = array('Q', [struct.unpack('=Q', struct.pack('=HBBI', 0x06, 0, 0, 0))[0]])
 """A classic BPF program of one instruction: return, and keep no byte."""
@@ -23,6 +26,14 @@ _AT_HAND = 0.02
 
 _AT_MOST = 0.5
 """Longest wait for the middleware to have read what came before [s]."""
+
+
+def deliver(publishers: Iterable[Publisher], at_most: float = 2.0) -> None:
+    """Give what was published last the time to arrive: ``at_most`` [s] for all of them."""
+    deadline = time.monotonic() + at_most
+    for publisher in publishers:
+        left = max(deadline - time.monotonic(), 0.0)
+        publisher.wait_for_all_acked(Duration(seconds=left))
 
 
 def deafen() -> None:

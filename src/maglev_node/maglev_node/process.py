@@ -8,15 +8,12 @@ import os
 import pkgutil
 import signal
 import sys
-import time
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from functools import partial
 from typing import Any, NoReturn
 
 import rclpy
-from rclpy.duration import Duration
-from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
@@ -25,12 +22,9 @@ from maglev_model.parameters import ParameterError
 from maglev_model.programs.command import leave_with
 from maglev_node.dds import prepare_middleware
 from maglev_node.discovery import discovering
-from maglev_node.leaving import deafen
+from maglev_node.leaving import deafen, deliver
 from maglev_node.node import MaglevNode, NodeError, spin
 from maglev_node.usage import usage
-
-_DELIVERY_TIME = 2.0
-"""Longest wait at the end for readers to have what was published [s]."""
 
 _LEAVING_TIME = 5.0
 """Longest for a node that has closed to leave the graph [s]."""
@@ -160,17 +154,9 @@ def _close(nodes: Sequence[MaglevNode[Any]]) -> None:
     for node in nodes:
         node.close()
     faulthandler.dump_traceback_later(_LEAVING_TIME, exit=True)
-    _deliver(nodes)
+    deliver(publisher for node in nodes for publisher in node.publishers)
     deafen()
     for node in nodes:
         node.destroy_node()
     rclpy.try_shutdown()
     faulthandler.cancel_dump_traceback_later()
-
-
-def _deliver(nodes: Sequence[Node]) -> None:
-    """Give what was published last, such as currents of zero, the time to arrive."""
-    deadline = time.monotonic() + _DELIVERY_TIME
-    for publisher in (each for node in nodes for each in node.publishers):
-        left = max(deadline - time.monotonic(), 0.0)
-        publisher.wait_for_all_acked(Duration(seconds=left))

@@ -139,7 +139,7 @@ class ReferenceRun:
 
         It does where another stage's measurements cover all that is heard of it.
         """
-        runs = sequence > self._answered
+        runs = sequence > max(self._answered, self.newest)
         self.controller, self._answered = mode, sequence
         return runs
 

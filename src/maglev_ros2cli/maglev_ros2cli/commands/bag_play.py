@@ -7,12 +7,12 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
-from rclpy.duration import Duration
 from rosbags.interfaces import Connection
 from rosbags.rosbag2 import Reader
 from rosgraph_msgs.msg import Clock
 
 from maglev_model.programs.arguments import not_negative, positive
+from maglev_node.leaving import deliver
 from maglev_node.polling import PollingNode
 from maglev_node.stamp import set_stamp
 from maglev_ros2cli.bags import add_bag_path, add_overrides, opened, overrides, profile
@@ -22,8 +22,6 @@ from maglev_ros2cli.parser import CommandError, Verbs
 
 _CLOCK_RATE = 40.0
 _UNKNOWN_QOS = 10  # messages, where nobody tells what the publishers offered
-_DELIVERY = 3.0
-"""Longest wait for the last messages to arrive [s]."""
 
 
 def add(verbs: Verbs) -> None:
@@ -96,10 +94,7 @@ class _Player:
 
     def deliver(self) -> None:
         """Give the last messages the time to arrive."""
-        end = time.monotonic() + _DELIVERY
-        for publisher in self._publishers.values():
-            left = max(0.0, end - time.monotonic())
-            publisher.wait_for_all_acked(Duration(seconds=left))
+        deliver(self._publishers.values())
 
     def _messages(self) -> Iterator[tuple[Connection, int, bytes]]:
         played = [each for each in self._reader.connections if each.id in self._publishers]

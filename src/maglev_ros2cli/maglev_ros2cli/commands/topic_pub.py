@@ -6,6 +6,7 @@ import time
 from typing import Any
 
 from maglev_model.programs.arguments import count, not_negative, positive
+from maglev_node.leaving import deliver
 from maglev_ros2cli import qos
 from maglev_ros2cli.graph import absolute, add_arguments, add_topic_name, node
 from maglev_ros2cli.interfaces import names
@@ -60,6 +61,7 @@ def pub(arguments: Any) -> None:
             if arguments.print and count % arguments.print == 0:
                 print(f'publishing #{count}: {message!r}\n')
             publisher.publish(message)
+        deliver([publisher])
         time.sleep(arguments.keep_alive)
 
 
