@@ -25,7 +25,7 @@ QUIET = 0.15
 """Discovery ends when every participant of this machine is seen and nothing new comes so long [s].
 """
 
-NEEDED_QUIET = 1.0
+NEEDED_QUIET = 2.0
 """The same where something is asked for by its name and is not there yet [s]."""
 
 ABROAD_WAIT, MOST_WAIT = 1.0, 5.0
