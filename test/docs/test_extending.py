@@ -27,6 +27,7 @@ from maglev_study.flight import fly
 
 MODULES = (
     'law.py',
+    'node.py',
     'sliding.py',
     'lqr.py',
     'boards.py',
