@@ -58,8 +58,11 @@ def deafen() -> None:
 
 
 def _datagram_sockets() -> Iterator[socket.socket]:
-    """Duplicates of the process's own sockets of UDP."""
-    for name in os.listdir('/proc/self/fd'):
+    """Duplicates of the process's own sockets of UDP; none where the system does not list them."""
+    names: list[str] = []
+    with suppress(OSError):
+        names = os.listdir('/proc/self/fd')
+    for name in names:
         with suppress(OSError):
             if not stat.S_ISSOCK(os.stat(int(name)).st_mode):
                 continue
