@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import socket
 import stat
@@ -16,7 +17,7 @@ from termios import FIONREAD
 from rclpy.duration import Duration
 from rclpy.publisher import Publisher
 
-_DROP_ALL = array('Q', [struct.unpack('=Q', struct.pack('=HBBI', 0x06, 0, 0, 0))[0]])
+_DROP_ALL = ctypes.create_string_buffer(struct.pack('HBBI', 0x06, 0, 0, 0))
 """A classic BPF program of one instruction: return, and keep no byte."""
 
 _ATTACH_FILTER = 26  # SO_ATTACH_FILTER of asm-generic/socket.h
@@ -45,7 +46,7 @@ def deafen() -> None:
     then, where several nodes leave together. Who hears nothing has none of those callbacks.
     """
     sockets = list(_datagram_sockets())
-    program = struct.pack('HP', len(_DROP_ALL), _DROP_ALL.buffer_info()[0])
+    program = struct.pack('HP', 1, ctypes.addressof(_DROP_ALL))
     for each in sockets:
         with suppress(OSError):  # a kernel without filters
             each.setsockopt(socket.SOL_SOCKET, _ATTACH_FILTER, program)
