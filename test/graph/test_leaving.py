@@ -12,7 +12,7 @@ import time
 import rclpy
 from std_msgs.msg import Empty
 from maglev_node.dds import prepare_middleware
-from maglev_node.leaving import deafen
+from maglev_node.leaving import stop_receiving
 
 prepare_middleware()
 rclpy.init()
@@ -20,7 +20,7 @@ node = rclpy.create_node('leaver')
 node.create_publisher(Empty, 'last_words', 1)
 while not node.count_subscribers('last_words'):
     time.sleep(0.01)
-deafen()
+stop_receiving()
 print('deaf', flush=True)
 time.sleep(2.0)
 print('hears', node.count_publishers('too_late'), flush=True)

@@ -27,7 +27,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from maglev_model.contract.wire import record_type
 from maglev_node.dds import prepare_middleware
-from maglev_node.leaving import deafen
+from maglev_node.leaving import stop_receiving
 from maglev_node.polling import PolledSubscription, PollingNode
 from maglev_node.topics import KEYS, SAMPLE_TOPICS, sampled
 
@@ -311,6 +311,6 @@ class Observer:
     def close(self) -> None:
         """Leave the graph."""
         self._executor.shutdown()
-        deafen()
+        stop_receiving()
         self.node.destroy_node()
         self._context.try_shutdown()

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from maglev_node.leaving import deafen
+from maglev_node.leaving import stop_receiving
 
 _begun: float | None = None  # when, in this process [s]
 
@@ -33,7 +33,7 @@ def discovering(name: str) -> Iterator[None]:
     try:
         yield
     except Exception:
-        deafen()  # it may be the last
+        stop_receiving()  # it may be the last
         raise
     finally:
         node.destroy_node()

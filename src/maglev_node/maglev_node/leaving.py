@@ -22,10 +22,10 @@ _DROP_ALL = ctypes.create_string_buffer(struct.pack('HBBI', 0x06, 0, 0, 0))
 
 _ATTACH_FILTER = 26  # SO_ATTACH_FILTER of asm-generic/socket.h
 
-_AT_HAND = 0.02
-"""Enough for what came before to be dealt with [s]."""
+_CALLBACK_TIME = 0.02
+"""Enough for the callbacks of what was read last [s]."""
 
-_AT_MOST = 0.5
+_READING_TIME = 0.5
 """Longest wait for the middleware to have read what came before [s]."""
 
 
@@ -37,23 +37,23 @@ def deliver(publishers: Iterable[Publisher], at_most: float = 2.0) -> None:
         publisher.wait_for_all_acked(Duration(seconds=left))
 
 
-def deafen() -> None:
-    """Hear nothing more from the network, of anything this process has open; it can still speak.
+def stop_receiving() -> None:
+    """Receive nothing more by UDP, on any socket this process has open; it can still send.
 
     Call it before the last node of a process is destroyed. Where Fast DDS is built with an old
     libstdc++, as in the wheels, it waits for ever, at full speed, when its participant is deleted
     while a callback tells of another one's writer or reader (eProsima/Fast-DDS issue 6513): now and
-    then, where several nodes leave together. Who hears nothing has none of those callbacks.
+    then, where several nodes leave together. Who receives nothing has none of those callbacks.
     """
     sockets = list(_datagram_sockets())
     program = struct.pack('HP', 1, ctypes.addressof(_DROP_ALL))
     for each in sockets:
         with suppress(OSError):  # a kernel without filters
             each.setsockopt(socket.SOL_SOCKET, _ATTACH_FILTER, program)
-    deadline = time.monotonic() + _AT_MOST
+    deadline = time.monotonic() + _READING_TIME
     while any(map(_waiting, sockets)) and time.monotonic() < deadline:
         time.sleep(1e-3)
-    time.sleep(_AT_HAND)
+    time.sleep(_CALLBACK_TIME)
     for each in sockets:
         each.close()
 

@@ -22,7 +22,7 @@ from maglev_model.parameters import ParameterError
 from maglev_model.programs.command import leave_with
 from maglev_node.dds import prepare_middleware
 from maglev_node.discovery import discovering
-from maglev_node.leaving import deafen, deliver
+from maglev_node.leaving import deliver, stop_receiving
 from maglev_node.node import MaglevNode, NodeError, spin
 from maglev_node.usage import usage
 
@@ -155,7 +155,7 @@ def _close(nodes: Sequence[MaglevNode[Any]]) -> None:
         node.close()
     faulthandler.dump_traceback_later(_LEAVING_TIME, exit=True)
     deliver(publisher for node in nodes for publisher in node.publishers)
-    deafen()
+    stop_receiving()
     for node in nodes:
         node.destroy_node()
     rclpy.try_shutdown()

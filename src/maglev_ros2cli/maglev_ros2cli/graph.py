@@ -17,7 +17,7 @@ from rclpy.validate_full_topic_name import validate_full_topic_name
 
 from maglev_model.programs.arguments import not_negative
 from maglev_node.dds import local_participants, only_here, prepare_middleware
-from maglev_node.leaving import deafen
+from maglev_node.leaving import stop_receiving
 from maglev_node.polling import PollingNode
 from maglev_ros2cli.parser import CommandError, Parser, Verbs, complete
 
@@ -92,7 +92,7 @@ def node(name: str | None = None) -> Iterator[PollingNode]:
     try:
         yield own
     finally:
-        deafen()
+        stop_receiving()
         own.destroy_node()
         rclpy.try_shutdown()
 
