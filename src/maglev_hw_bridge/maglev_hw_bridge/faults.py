@@ -38,7 +38,10 @@ def encoder_fault(code: int, watched: Guard) -> tuple[str, str]:
     names = ', '.join(ENCODER_NAMES[i] for i in watched.blamed)
     if code == guard.JUMP:
         return f'encoder {names} jumped', 'check its cable, home again'
-    return f'encoder {names} is stuck, or its motors are', 'check its cable and the phases'
+    remedy = 'check its cable and the phases'
+    if set(watched.blamed) >= {0, 1, 2, 3}:
+        remedy += '; home again if the platen carries something else now'
+    return f'encoder {names} is stuck, or its motors are', remedy
 
 
 def command_fault(

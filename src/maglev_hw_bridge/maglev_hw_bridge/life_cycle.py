@@ -188,6 +188,7 @@ class StageLife(abc.ABC):
             because = f': {self.fault.reason}'
         self.fault = self.fault or latched
         if lift.fine:
+            self.guard.arrays.rises_at = lift.rises_at
             return
         self.encoders.homed = False
         if not lifted:

@@ -65,8 +65,8 @@ class FaultParameters:
     )
     stuck_gap: float = parameter(
         2e-4,
-        'a gap encoder is stuck when it should have moved this far without a count, or when '
-        'meanwhile the four have come to contradict each other by half of it',
+        'a gap encoder is stuck when it should have moved this far without a count, all of them '
+        'by half of it, or when meanwhile the four have come to contradict each other by half',
         unit='m',
         within=(1e-6, 0.1),
     )

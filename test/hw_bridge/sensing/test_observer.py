@@ -120,6 +120,39 @@ def test_the_model_alone_moves_what_friction_and_stops_let_go(
     np.testing.assert_allclose(watched.still_time, np.where(goes, time + T, 0.0), atol=1e-12)
 
 
+@pytest.mark.parametrize('off', [1.0, -1.0])
+@pytest.mark.parametrize('way', [1.0, -1.0])
+@pytest.mark.parametrize('rested', [False, True])
+def test_of_what_rests_half_the_friction_is_in_doubt_where_homing_has_lifted_it(
+    off: float, way: float, rested: bool
+) -> None:
+    """And none of what is off: it rises by that for sure. Else friction, twice, and the support."""
+    then = np.array([off, 0.0, 0.0, 0.0, 0.0])
+    watched = watched_at(np.array([1.0, 0.0, 0.0, 0.0, 0.0]), np.zeros(5), then)
+    watched.position[Y] = UPPER[Y] - 1e-4
+    watched.rested, watched.model_rate[Y] = rested, 0.1 * way
+    watched.disturbance[Y] = watched.disturbance_then[Y] = off
+    push = output_accelerations(MACHINE, *watched.position[[0, 3, 4]], np.zeros(4), np.zeros(4))[0]
+    observer.predict(watched.block[0], np.zeros(12))
+    gained = 0.1 * way + T * (push + off)
+    held = 0.5 * FRICTION[Y] if rested else 1.5 + FRICTION[Y] * (1.0 + (way * off > 0.0))
+    towards_the_stop = way > 0.0
+    expected = 0.0 if towards_the_stop else -(abs(gained) - held * T)
+    assert watched.least_rate[Y] == pytest.approx(expected, rel=1e-6)
+    assert watched.rested is rested
+
+
+@pytest.mark.parametrize('above', [1.9e-4, 2.1e-4])
+def test_what_has_left_its_stop_rests_no_more(above: float) -> None:
+    watched = watched_at(np.zeros(5), np.zeros(5), np.zeros(5))
+    watched.position[Y], watched.rested = UPPER[Y] - above, True
+    observer.predict(watched.block[0], np.zeros(12))
+    assert watched.rested is (above < 2e-4)
+    watched.rested = True
+    observer.start(watched.block[0], lengths(watched.position))
+    assert not watched.rested
+
+
 @pytest.mark.parametrize('axis', range(5))
 @pytest.mark.parametrize('stop', ['lower', 'upper'])
 def test_a_stop_may_carry_what_is_near_it(axis: int, stop: str) -> None:

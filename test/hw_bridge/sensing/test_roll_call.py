@@ -111,3 +111,45 @@ def test_who_is_lost_cannot_excuse_another(k: int) -> None:
     watched.trust[k] = LOST
     assert call_the_roll(watched.block[0], True, np.zeros(6, bool))
     assert watched.trust[0] == LOST
+
+
+@pytest.mark.parametrize('lost', [[], [1], [0, 1, 2]])
+def test_none_of_them_has_told_of_a_platen_that_has_risen_for_sure(lost: list[int]) -> None:
+    """By the bound to the last bit, of which ``lost`` ones say nothing."""
+    left = [i for i in range(4) if i not in lost]
+    watched = hovering()
+    watched.answered[:], watched.rested = 0, True
+    watched.trust[lost], watched.answered[lost] = LOST, 1
+    watched.unseen[:4] = -1.0
+    watched.unseen[left[-1]] = PARAMETERS.fault.roll_call
+    nobody = np.zeros(6, bool)
+    assert not call_the_roll(watched.block[0], True, nobody)
+    watched.unseen[left[-1]] = np.nextafter(PARAMETERS.fault.roll_call, 1.0)
+    assert call_the_roll(watched.block[0], True, nobody)
+    assert np.flatnonzero(watched.trust == LOST).tolist() == [0, 1, 2, 3]
+    assert np.flatnonzero(watched.blamed).tolist() == left
+    assert not call_the_roll(watched.block[0], True, nobody)
+
+
+@pytest.mark.parametrize('why', ['one answered', 'it is not known', 'on the ground'])
+def test_or_one_has_or_nobody_knows_whether_it_has(why: str) -> None:
+    watched = hovering()
+    watched.answered[:], watched.rested = 0, why != 'it is not known'
+    watched.answered[2] = int(why == 'one answered')
+    watched.unseen[:4] = -1.0
+    assert not call_the_roll(watched.block[0], why != 'on the ground', np.zeros(6, bool))
+    assert not watched.trust.any()
+
+
+@pytest.mark.parametrize('y', [0.025, STOP - 1e-4])
+@pytest.mark.parametrize('rises_at', [np.nan, -0.7])
+def test_while_it_rests_what_it_rises_at_is_what_the_model_is_off_by(
+    y: float, rises_at: float
+) -> None:
+    watched = hovering()
+    watched.position[Y], watched.rises_at, watched.rested = y, rises_at, True
+    watched.disturbance[Y] = watched.disturbance_then[Y] = 3.0
+    await_lift_off(watched.block[0])
+    known = y > 0.03 and not np.isnan(rises_at)
+    assert watched.disturbance[Y] == watched.disturbance_then[Y] == (0.7 if known else 3.0)
+    assert watched.rested is (known or y < 0.03)

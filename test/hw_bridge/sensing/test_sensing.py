@@ -57,6 +57,7 @@ def test_one_stuck_encoder_is_blamed_alone_and_the_platen_landed(encoder: int) -
     assert flight.detected is not None
     assert flight.detected - 200 <= 50
     assert 'is stuck' in str(flight.stage.fault)
+    assert 'home again' not in str(flight.stage.fault)
 
 
 @pytest.mark.parametrize('pair', PAIRS)

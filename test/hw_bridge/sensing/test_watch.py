@@ -299,6 +299,7 @@ def test_what_is_given_as_a_time_takes_as_long_at_any_sample_time(
     watched.samples = watched.settling - 1
     for number in range(samples + 1):
         watched.disturbance[Y] = 1.01 * PARAMETERS.fault.unexplained[Y]
+        watched.disturbance_then[Y] = watched.unseen[:4] = 0.0  # which no encoder has told of
         watched.position[:] = [0.025, 0.0, 0.0, 0.0, 0.0]
         watched.rate[:] = 0.0
         assert hover.sample()[0] == (guard.MOTORS if number == samples else guard.FINE)

@@ -140,11 +140,16 @@ def test_2_a_cut_is_judged_by_the_hardest_stop_of_its_fall() -> None:
 
 
 def test_3_outputs_left_on(flown: Flown, monkeypatch: pytest.MonkeyPatch) -> None:
+    sound = Amplifiers.drive
+
     def cut(self: Amplifiers) -> Any:
         return self.arrays.volts
 
+    def drive(self: Amplifiers, i_d: Any, i_q: Any, *place: float) -> Any:
+        return sound(self, i_d, i_q, *place) if np.any(i_d) or np.any(i_q) else (0, 0)
+
     monkeypatch.setattr(Amplifiers, 'cut', cut)
-    monkeypatch.setattr(Amplifiers, 'drive', lambda *_: (0, 0))
+    monkeypatch.setattr(Amplifiers, 'drive', drive)
     monkeypatch.setattr(Board, 'rest', lambda self: self.put_out(np.full(6, 0.5)))
     assert 3 in broken(flown(KILLED, 'rest', 0.5))
 

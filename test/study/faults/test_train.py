@@ -10,9 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from maglev_model.parameters import replace
 from maglev_study.faults import train
-from maglev_study.faults.flight import Flight
+from maglev_study.faults.flight import Bridge, Flight
 from maglev_study.faults.fly import Scenario
 from maglev_study.faults.kinds import Fault
 from maglev_study.faults.machines import PLAIN, believed
@@ -23,11 +22,19 @@ ROUGH = believed(Path(__file__).resolve().parents[3] / 'params' / 'rough.yaml')
 @pytest.mark.parametrize(
     ('phase', 'said'), [('hover', 'is stuck'), ('after a fault', 'are not believed')]
 )
-def test_a_false_alarm_breaks_a_rule(phase: str, said: str) -> None:
+def test_a_false_alarm_breaks_a_rule(
+    phase: str, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """In flight it is a fault; while the bridge lands for another reason nobody would see it."""
-    doubting = {'fault.friction': (0.0,) * 5, 'fault.stuck_gap': 3e-5}
-    suspicious = PLAIN._replace(bridge=replace(PLAIN.bridge, doubting))
-    ((_, verdict),) = train.fly_all([Scenario(1, phase, 0.5, (Fault('none'),), 1)], suspicious)
+    activate = Bridge.activate
+
+    def suspicious(self: Bridge) -> bool:
+        self.stage.guard.arrays.friction[:] = 0.0
+        self.stage.guard.arrays.max_unseen[:] = 3e-5
+        return activate(self)
+
+    monkeypatch.setattr(Bridge, 'activate', suspicious)
+    ((_, verdict),) = train.fly_all([Scenario(1, phase, 0.5, (Fault('none'),), 1)], PLAIN)
     ((rule, text),) = verdict.violations
     assert rule == 5
     assert 'though nothing had failed' in text

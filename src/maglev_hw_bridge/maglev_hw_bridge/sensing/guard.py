@@ -117,6 +117,7 @@ def _begin(g: GuardArrays) -> int:
         g.step[:] = 0.0
         found = find_leaps(g)
         observer.start(g, g.believed)
+        observer.rest(g)
         return JUMP if found else FINE
     observer.start(g, g.believed)
     for axis in range(5):
@@ -237,6 +238,7 @@ class Guard:
     def trust(self) -> None:
         """Believe every encoder again: they have just been homed."""
         self.forget()
+        self.arrays.rises_at = math.nan
         self.arrays.trust[:] = SOUND
         self.arrays.stood[:] = 0
         self.arrays.probation[:] = 0

@@ -29,6 +29,7 @@ SUPPORT = 2e-4
 """This near a stop it may carry the platen [m]."""
 
 _SUPPORTED = 1.5  # what the weight and its support may then differ in from the model's [m/s²]
+_LIFTED = 0.5  # as many times the friction where homing has found out what lifts it
 _TILT_SUPPORT = 1e-4  # the same of the tilts [rad]
 
 
@@ -45,6 +46,8 @@ class ObserverArrays(Record):
     upper: Annotated[FloatArray, 5]
     friction: Annotated[FloatArray, 5]  # what may hold the platen against the model [m/s², rad/s²]
 
+    rises_at: float  # by the model, off the lower stop; not a number: not known [m/s²]
+    rested: bool  # where that is known, and has not left the stop since
     position: Annotated[FloatArray, 5]  # [m, rad]
     rate: Annotated[FloatArray, 5]
     disturbance: Annotated[FloatArray, 5]  # acceleration that the model does not explain
@@ -77,6 +80,7 @@ def observer_fields(parameters: BridgeParameters) -> dict[str, Any]:
         'lower': machine.lower_limit,
         'upper': machine.upper_limit,
         'friction': parameters.fault.friction,
+        'rises_at': math.nan,
     }
 
 
@@ -90,6 +94,7 @@ def _foretell(o: ObserverArrays) -> None:
 @borrowing
 def start(o: ObserverArrays, length: FloatArray) -> None:
     """Begin at rest where the encoders (6,) [m] say."""
+    o.rested = False
     machine = machine_from_array(o.machine)
     outputs_from_gaps(machine, length[:4], length[4], length[5], o.position)
     for axis in range(5):
@@ -135,21 +140,32 @@ def predict(o: ObserverArrays, current: FloatArray) -> None:
     """Carry on over one sample in which phase currents (12,) [A] flowed."""
     push = _push(o, current)
     seated = supported(o, Y)
+    o.rested = o.rested and seated
     _foretell(o)
     before = o.length.copy()
     for axis in range(5):
-        held = o.friction[axis]
-        if axis == Y and seated:
+        held = turning = o.friction[axis]  # what is off may have been friction, which can turn
+        if axis == Y and o.rested:
+            held, turning = _LIFTED * held, 0.0
+        elif axis == Y and seated:
             held += _SUPPORTED
         elif supported(o, axis) or (seated and axis >= PHI):
             held = math.inf
-        _carry(o, axis, push[axis], held)
+        _carry(o, axis, push[axis], held, turning)
     _foretell(o)
     o.step[:] = o.length - before
 
 
 @borrowing
-def _carry(o: ObserverArrays, axis: int, push: float, held: float) -> None:
+def rest(o: ObserverArrays) -> None:
+    """What the platen rises at, if homing has found out, is what the model is off by there."""
+    o.rested = not math.isnan(o.rises_at)
+    if o.rested:
+        o.disturbance[Y] = o.disturbance_then[Y] = -o.rises_at
+
+
+@borrowing
+def _carry(o: ObserverArrays, axis: int, push: float, held: float, turning: float) -> None:
     period = o.period
     acceleration = push + o.disturbance[axis]
     o.acceleration[axis] = acceleration
@@ -161,7 +177,7 @@ def _carry(o: ObserverArrays, axis: int, push: float, held: float) -> None:
     o.model_rate[axis] += period * (push + o.disturbance_then[axis])
     o.still_time[axis] += period
     along = math.copysign(1.0, o.model_rate[axis]) * o.disturbance_then[axis]
-    held += min(max(along, 0.0), o.friction[axis])  # it may have been friction, which can turn
+    held += min(max(along, 0.0), turning)
     left = abs(o.model_rate[axis]) - held * o.still_time[axis]
     if left > 0.0 and not _stopped(o, axis):
         o.least_rate[axis] = math.copysign(left, o.model_rate[axis])
@@ -189,8 +205,14 @@ def correct(o: ObserverArrays, length: FloatArray, used: Flags, counted: Flags) 
     told = (along_z or along_x, counted[4], counted[5], along_z, along_x)
     for axis in range(5):
         if told[axis]:
-            o.model_rate[axis], o.still_time[axis] = o.rate[axis], 0.0
-            o.disturbance_then[axis] = o.disturbance[axis]
+            take_for_true(o, axis)
+
+
+@borrowing
+def take_for_true(o: ObserverArrays, axis: int) -> None:
+    """From now on the model alone carries on from what is known of an axis."""
+    o.model_rate[axis], o.still_time[axis] = o.rate[axis], 0.0
+    o.disturbance_then[axis], o.least_rate[axis] = o.disturbance[axis], 0.0
 
 
 @borrowing

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 from maglev_hw_bridge.sensing import observer
@@ -53,18 +54,23 @@ def _at_rest(g: GuardArrays, i: int) -> bool:
 def look(g: GuardArrays, flying: bool, counted: Flags) -> None:
     """Which encoders counted, and how far each of the others should have moved since it did."""
     residual = gap_residual(g.believed)
+    settled = g.samples >= g.settling
+    if not (settled or g.rested):
+        for axis in (Y, PHI, THETA):
+            observer.take_for_true(g, axis)
     for i in range(6):
         counted[i] = g.trust[i] != LOST and g.believed[i] != g.past[0, i]
         if i >= 4 and counted[i] and abs(g.unseen[i]) > _DOUBT:
             observer.take_at_its_word(g, i - 3, g.believed[i])
-        if counted[i] or not flying or g.samples < g.settling or _at_rest(g, i):
+        judged = flying and (settled or (g.rested and i < 4))
+        if counted[i] or not judged or _at_rest(g, i):
             g.unseen[i] = 0.0
         else:
             g.unseen[i] += _least_step(g, i)
         if i < 4 and (counted[i] or not g.rigid):
             g.residual_then[i] = residual
         if i >= 4:
-            asked = flying and g.samples >= g.settling and g.trust[i] != LOST
+            asked = flying and settled and g.trust[i] != LOST
             asked = asked and not (counted[i] or observer.supported(g, Y))
             g.silent[i - 4] = g.silent[i - 4] + 1 if asked else 0
         g.probation[i] = max(g.probation[i] - 1, 0)
@@ -78,7 +84,10 @@ def _reach(g: GuardArrays, i: int, speed: float) -> float:
 
 @borrowing
 def await_lift_off(g: GuardArrays) -> None:
-    g.answered[:], g.left[:] = int(not observer.supported(g, Y)), 0.0
+    seated = observer.supported(g, Y)
+    g.answered[:], g.left[:] = int(not seated), 0.0
+    if seated:
+        observer.rest(g)
 
 
 @borrowing
@@ -95,11 +104,22 @@ def _excused(g: GuardArrays, i: int) -> bool:
 
 
 @borrowing
+def _risen_unheard(g: GuardArrays) -> bool:
+    """Whether no gap encoder has told of a platen that has risen for sure."""
+    unseen = math.inf if g.rested else 0.0
+    for i in range(4):
+        if g.trust[i] != LOST:
+            unseen = 0.0 if g.answered[i] != 0 else min(unseen, abs(g.unseen[i]))
+    return bool(g.roll_call < unseen < math.inf)
+
+
+@borrowing
 def call_the_roll(g: GuardArrays, flying: bool, counted: Flags) -> bool:
     """Do without gap encoders that do not answer when the platen lifts off; whether there are some.
 
     Two that are stuck look like a tilt, which the controller undoes by one that nobody sees: soon
-    neither the others nor, with the stop's support unknown, the model could tell.
+    neither the others nor, with the stop's support unknown, the model could tell. All of them are
+    called by the currents, where the lift of homing has found out which it takes.
     """
     if not flying:
         await_lift_off(g)
@@ -110,6 +130,7 @@ def call_the_roll(g: GuardArrays, flying: bool, counted: Flags) -> bool:
         g.answered[i] = max(g.answered[i], int(counted[i]))
         g.left[i] = g.left[i] + step if abs(step) < _reach(g, i, _LEAP) else 0.0
         called = called or (g.trust[i] == SOUND and abs(g.left[i]) > g.roll_call)
+    called = called or _risen_unheard(g)
     found = False
     for i in range(4):
         if called and g.answered[i] == 0 and g.trust[i] != LOST and not _excused(g, i):
@@ -127,6 +148,17 @@ def _residual_since(g: GuardArrays, i: int) -> float:
 
 
 @borrowing
+def _most(g: GuardArrays, i: int, doubted: Flags) -> float:
+    """How far an encoder may be missed; if no gap tells otherwise, half as far [m].
+
+    But not where nobody knows what the lower stop carries.
+    """
+    none = doubted[0] and doubted[1] and doubted[2] and doubted[3]
+    known = g.rested or not observer.supported(g, Y)
+    return float((0.5 if i < 4 and none and known else 1.0) * g.max_unseen[i])
+
+
+@borrowing
 def _denied(g: GuardArrays, doubted: Flags, share: float) -> bool:
     """Whether four gaps go on being those of a rigid platen that the motion in doubt would tilt.
 
@@ -136,7 +168,7 @@ def _denied(g: GuardArrays, doubted: Flags, share: float) -> bool:
     """
     missing = shown = 0.0
     for i in range(4):
-        if g.rigid and doubted[i] and abs(g.unseen[i]) > share * g.max_unseen[i]:
+        if g.rigid and doubted[i] and abs(g.unseen[i]) > share * _most(g, i, doubted):
             missing += g.unseen[i] if i % 2 == 0 else -g.unseen[i]
             shown = max(shown, _residual_since(g, i))
     return bool(abs(missing) > _DENIED and shown < 0.5 * abs(missing))
@@ -212,7 +244,7 @@ def find_stuck(g: GuardArrays, doubted: Flags, doubt: int) -> bool:
     found = False
     denied = doubt == UNSEEN and _denied(g, doubted, 1.0)
     for i in range(6):
-        gone = abs(g.unseen[i]) > g.max_unseen[i] and not (denied and i < 4)
+        gone = abs(g.unseen[i]) > _most(g, i, doubted) and not (denied and i < 4)
         if i < 4 and doubt == CONTRADICTED:
             gone = _residual_since(g, i) > 0.5 * g.max_unseen[i]
         if doubted[i] and gone:

@@ -75,7 +75,7 @@ def _go(flight: Flight, place: int) -> None:
     """Fly on to a sample."""
     bridge = flight.bridge
     if place >= -1 and not bridge.homed:
-        _demand(bridge.configure() and bridge.home(vouched=True), flight)
+        _demand(bridge.configure() and bridge.home(), flight)
     if place >= 0 and not bridge.active:
         _demand(bridge.activate(), flight)
     while flight.samples < place:
