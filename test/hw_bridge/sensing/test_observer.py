@@ -139,7 +139,7 @@ def test_of_what_rests_half_the_friction_is_in_doubt_where_homing_has_lifted_it(
     towards_the_stop = way > 0.0
     expected = 0.0 if towards_the_stop else -(abs(gained) - held * T)
     assert watched.least_rate[Y] == pytest.approx(expected, rel=1e-6)
-    assert watched.rested is rested
+    assert bool(watched.rested) is rested
 
 
 @pytest.mark.parametrize('above', [1.9e-4, 2.1e-4])
@@ -147,7 +147,7 @@ def test_what_has_left_its_stop_rests_no_more(above: float) -> None:
     watched = watched_at(np.zeros(5), np.zeros(5), np.zeros(5))
     watched.position[Y], watched.rested = UPPER[Y] - above, True
     observer.predict(watched.block[0], np.zeros(12))
-    assert watched.rested is (above < 2e-4)
+    assert bool(watched.rested) is (above < 2e-4)
     watched.rested = True
     observer.start(watched.block[0], lengths(watched.position))
     assert not watched.rested

@@ -152,4 +152,4 @@ def test_while_it_rests_what_it_rises_at_is_what_the_model_is_off_by(
     await_lift_off(watched.block[0])
     known = y > 0.03 and not np.isnan(rises_at)
     assert watched.disturbance[Y] == watched.disturbance_then[Y] == (0.7 if known else 3.0)
-    assert watched.rested is (known or y < 0.03)
+    assert bool(watched.rested) is (known or y < 0.03)
