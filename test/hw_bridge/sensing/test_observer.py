@@ -208,7 +208,7 @@ def test_what_the_encoders_tell_corrects_by_the_observers_gains(
     watched = watched_at(np.zeros(5), np.full(5, 0.01), np.full(5, 0.1))
     watched.acceleration[:] = 100.0  # of which no friction stops what coasts
     watched.model_rate[:], watched.still_time[:], watched.disturbance_then[:] = 7.0, 8.0, 9.0
-    watched.length[:] = lengths(watched.position)
+    watched.least_rate[:], watched.length[:] = 6.0, lengths(watched.position)
     before = watched.position.copy()
     observer.correct(watched.block[0], watched.length + off, used, counted)
     count = np.array(PARAMETERS.encoder.resolution)
@@ -231,6 +231,19 @@ def test_what_the_encoders_tell_corrects_by_the_observers_gains(
     np.testing.assert_array_equal(watched.still_time, np.where(heard, 0.0, 8.0))
     expected = np.where(heard, watched.disturbance, 9.0)
     np.testing.assert_array_equal(watched.disturbance_then, expected)
+    np.testing.assert_array_equal(watched.least_rate, np.where(heard, 0.0, 6.0))
+
+
+@pytest.mark.parametrize('rises_at', [np.nan, -0.7, 0.4])
+def test_what_rests_is_off_by_what_it_rises_at(rises_at: float) -> None:
+    watched = watched_at(np.zeros(5), np.zeros(5), np.zeros(5))
+    watched.rises_at, watched.rested = rises_at, np.isnan(rises_at)
+    watched.disturbance[:] = watched.disturbance_then[:] = 3.0
+    observer.rest(watched.block[0])
+    known = not np.isnan(rises_at)
+    assert bool(watched.rested) is known
+    for array in (watched.disturbance, watched.disturbance_then):
+        assert array.tolist() == [-rises_at if known else 3.0, 3.0, 3.0, 3.0, 3.0]
 
 
 def test_on_the_lower_stop_its_support_is_no_disturbance() -> None:
