@@ -30,7 +30,7 @@ def test_all_are_stuck_by_half_of_what_one_is(way: float) -> None:
 @pytest.mark.parametrize('x', [False, True])
 def test_but_not_where_one_has_told_of_it(sound: int, x: bool) -> None:
     watched = hovering()
-    watched.unseen[:4] = 0.99 * GAP
+    watched.rigid, watched.unseen[:4] = False, 0.99 * GAP  # so that none denies it
     doubted = (np.arange(6) < 4 + x) & (np.arange(6) != sound)
     assert not find_stuck(watched.block[0], doubted, UNSEEN)
     assert not watched.trust.any()
