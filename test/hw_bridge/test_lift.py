@@ -18,7 +18,7 @@ STOP = BridgeParameters().machine.gap_max
 GRAVITY = BridgeParameters().machine.gravity
 GAPS = [0, 1, 2, 3]
 SOFT = 0.05  # [m/s]
-RISE = 0.6  # from the stop up to 30 mm [s]
+RISE = 0.6  # by a millimetre [s]
 
 
 def machine(heavier: float, friction: float) -> dict[str, object]:
@@ -27,13 +27,27 @@ def machine(heavier: float, friction: float) -> dict[str, object]:
     return {'emulation.offset.mass_y': heavier, 'emulation.guide.coulomb': coulomb}
 
 
-def homed(heavier: float, friction: float) -> BridgeStage:
+def unhomed(heavier: float, friction: float) -> tuple[BridgeStage, EmulatedBoards]:
     dotted = machine(heavier, friction)
     overrides = {name.replace('.', '__'): value for name, value in dotted.items()}
-    stage, _ = bridge(homing__at_start=False, **overrides)
+    return bridge(homing__at_start=False, **overrides)
+
+
+def homed(heavier: float, friction: float) -> BridgeStage:
+    stage, _ = unhomed(heavier, friction)
     stage.configure()
     stage.home()
     return stage
+
+
+def lifting_off(heavier: float, friction: float) -> Flight:
+    """Active on the lower stop after homing with the lift."""
+    flight = Flight(rising, {**machine(heavier, friction), 'homing.at_start': True})
+    flight.stage.deactivate()
+    flight.stage.home()
+    flight.stage.activate()
+    flight.rig.forget_impact()
+    return flight
 
 
 @pytest.mark.parametrize('heavier', [0.9, 1.0, 1.1])
@@ -60,9 +74,7 @@ def test_gap_encoders_that_are_not_plugged_in_lift_nothing_far(
     heavier: float, friction: float
 ) -> None:
     """Not push by push either, where friction holds up what hardly weighs more than is carried."""
-    dotted = machine(heavier, friction)
-    overrides = {name.replace('.', '__'): value for name, value in dotted.items()}
-    stage, boards = bridge(homing__at_start=False, **overrides)
+    stage, boards = unhomed(heavier, friction)
     boards.stuck[GAPS] = True
     heights = _heights(boards)
     stage.configure()
@@ -100,11 +112,7 @@ def test_gap_encoders_that_stand_still_at_lift_off_are_missed_before_it_is_gone(
     heavier: float, friction: float
 ) -> None:
     """What falls back from there does so softly; without the lift it would strike either stop."""
-    flight = Flight(rising, {**machine(heavier, friction), 'homing.at_start': True})
-    flight.stage.deactivate()
-    flight.stage.home()
-    flight.stage.activate()
-    flight.rig.forget_impact()
+    flight = lifting_off(heavier, friction)
     flight.boards.stuck[GAPS] = True
     flight.run(400)
     assert flight.stage.mode is Mode.DISABLED
@@ -122,10 +130,7 @@ def test_gap_encoders_that_stand_still_at_lift_off_are_missed_before_it_is_gone(
 @pytest.mark.parametrize('heavier', [0.9, 1.0, 1.1])
 def test_sound_ones_tell_of_it_in_time(heavier: float, friction: float, load: float) -> None:
     """Also where it carries ``load`` [kg] more than when it was homed."""
-    flight = Flight(rising, {**machine(heavier, friction), 'homing.at_start': True})
-    flight.stage.deactivate()
-    flight.stage.home()
-    flight.stage.activate()
+    flight = lifting_off(heavier, friction)
     watched, most = flight.stage.guard.arrays, 0.0
     watched.rises_at += load * GRAVITY / flight.stage.parameters.machine.mass_y
     for _ in range(900):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hovering import PARAMETERS, hovering
 
+from maglev_hw_bridge.sensing import observer
 from maglev_hw_bridge.sensing.guard_arrays import LOST, PUT_RIGHT, SOUND
 from maglev_hw_bridge.sensing.standing_still import (
     await_lift_off,
@@ -153,3 +154,17 @@ def test_while_it_rests_what_it_rises_at_is_what_the_model_is_off_by(
     known = y > 0.03 and not np.isnan(rises_at)
     assert watched.disturbance[Y] == watched.disturbance_then[Y] == (0.7 if known else 3.0)
     assert bool(watched.rested) is (known or y < 0.03)
+
+
+def test_what_hangs_on_the_upper_stop_does_not_rest() -> None:
+    """What lifts it off the lower one says nothing there."""
+    watched = hovering()
+    watched.position[Y], watched.rises_at = PARAMETERS.machine.gap_min + 1e-4, -0.7
+    await_lift_off(watched.block[0])
+    assert not watched.rested
+    observer.start(watched.block[0], np.array([*[watched.position[Y]] * 4, 0.0, 0.0]))
+    assert not watched.rested
+    assert watched.disturbance[Y] == 0.0
+    observer.start(watched.block[0], np.array([*[STOP - 1e-4] * 4, 0.0, 0.0]))
+    assert watched.rested
+    assert watched.disturbance[Y] == 0.7

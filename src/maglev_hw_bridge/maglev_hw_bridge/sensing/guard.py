@@ -117,7 +117,6 @@ def _begin(g: GuardArrays) -> int:
         g.step[:] = 0.0
         found = find_leaps(g)
         observer.start(g, g.believed)
-        observer.rest(g)
         return JUMP if found else FINE
     observer.start(g, g.believed)
     for axis in range(5):

@@ -94,14 +94,30 @@ def _foretell(o: ObserverArrays) -> None:
 @borrowing
 def start(o: ObserverArrays, length: FloatArray) -> None:
     """Begin at rest where the encoders (6,) [m] say."""
-    o.rested = False
     machine = machine_from_array(o.machine)
     outputs_from_gaps(machine, length[:4], length[4], length[5], o.position)
     for axis in range(5):
         o.rate[axis] = o.disturbance[axis] = 0.0
         o.model_rate[axis] = o.least_rate[axis] = 0.0
         o.disturbance_then[axis] = o.still_time[axis] = 0.0
+    o.rested = False
+    if near_lower_stop(o):
+        rest(o)
     _foretell(o)
+
+
+@borrowing
+def near_lower_stop(o: ObserverArrays) -> bool:
+    """Whether the lower stop may carry the platen."""
+    return bool(o.upper[Y] - o.position[Y] < SUPPORT)
+
+
+@borrowing
+def rest(o: ObserverArrays) -> None:
+    """What the platen rises at, if homing has found out, is what the model is off by there."""
+    o.rested = not math.isnan(o.rises_at)
+    if o.rested:
+        o.disturbance[Y] = o.disturbance_then[Y] = -o.rises_at
 
 
 @compiled
@@ -157,14 +173,6 @@ def predict(o: ObserverArrays, current: FloatArray) -> None:
 
 
 @borrowing
-def rest(o: ObserverArrays) -> None:
-    """What the platen rises at, if homing has found out, is what the model is off by there."""
-    o.rested = not math.isnan(o.rises_at)
-    if o.rested:
-        o.disturbance[Y] = o.disturbance_then[Y] = -o.rises_at
-
-
-@borrowing
 def _carry(o: ObserverArrays, axis: int, push: float, held: float, turning: float) -> None:
     period = o.period
     acceleration = push + o.disturbance[axis]
@@ -205,12 +213,12 @@ def correct(o: ObserverArrays, length: FloatArray, used: Flags, counted: Flags) 
     told = (along_z or along_x, counted[4], counted[5], along_z, along_x)
     for axis in range(5):
         if told[axis]:
-            take_for_true(o, axis)
+            restart_model(o, axis)
 
 
 @borrowing
-def take_for_true(o: ObserverArrays, axis: int) -> None:
-    """From now on the model alone carries on from what is known of an axis."""
+def restart_model(o: ObserverArrays, axis: int) -> None:
+    """Let the model alone carry on from what is known of an axis now."""
     o.model_rate[axis], o.still_time[axis] = o.rate[axis], 0.0
     o.disturbance_then[axis], o.least_rate[axis] = o.disturbance[axis], 0.0
 

@@ -57,7 +57,7 @@ def look(g: GuardArrays, flying: bool, counted: Flags) -> None:
     settled = g.samples >= g.settling
     if not (settled or g.rested):
         for axis in (Y, PHI, THETA):
-            observer.take_for_true(g, axis)
+            observer.restart_model(g, axis)
     for i in range(6):
         counted[i] = g.trust[i] != LOST and g.believed[i] != g.past[0, i]
         if i >= 4 and counted[i] and abs(g.unseen[i]) > _DOUBT:
@@ -84,9 +84,8 @@ def _reach(g: GuardArrays, i: int, speed: float) -> float:
 
 @borrowing
 def await_lift_off(g: GuardArrays) -> None:
-    seated = observer.supported(g, Y)
-    g.answered[:], g.left[:] = int(not seated), 0.0
-    if seated:
+    g.answered[:], g.left[:] = int(not observer.supported(g, Y)), 0.0
+    if observer.near_lower_stop(g):
         observer.rest(g)
 
 
@@ -148,7 +147,7 @@ def _residual_since(g: GuardArrays, i: int) -> float:
 
 
 @borrowing
-def _most(g: GuardArrays, i: int, doubted: Flags) -> float:
+def _unseen_limit(g: GuardArrays, i: int, doubted: Flags) -> float:
     """How far an encoder may be missed; if no gap tells otherwise, half as far [m].
 
     But not where nobody knows what the lower stop carries.
@@ -168,7 +167,7 @@ def _denied(g: GuardArrays, doubted: Flags, share: float) -> bool:
     """
     missing = shown = 0.0
     for i in range(4):
-        if g.rigid and doubted[i] and abs(g.unseen[i]) > share * _most(g, i, doubted):
+        if g.rigid and doubted[i] and abs(g.unseen[i]) > share * _unseen_limit(g, i, doubted):
             missing += g.unseen[i] if i % 2 == 0 else -g.unseen[i]
             shown = max(shown, _residual_since(g, i))
     return bool(abs(missing) > _DENIED and shown < 0.5 * abs(missing))
@@ -244,7 +243,7 @@ def find_stuck(g: GuardArrays, doubted: Flags, doubt: int) -> bool:
     found = False
     denied = doubt == UNSEEN and _denied(g, doubted, 1.0)
     for i in range(6):
-        gone = abs(g.unseen[i]) > _most(g, i, doubted) and not (denied and i < 4)
+        gone = abs(g.unseen[i]) > _unseen_limit(g, i, doubted) and not (denied and i < 4)
         if i < 4 and doubt == CONTRADICTED:
             gone = _residual_since(g, i) > 0.5 * g.max_unseen[i]
         if doubted[i] and gone:
