@@ -167,6 +167,31 @@ def test_who_is_asked_in_vain_is_stuck(monkeypatch: pytest.MonkeyPatch, silent: 
     assert stage.guard.failed == ([] if silent is None else [silent])
 
 
+@pytest.mark.parametrize('mode', [Mode.FOLLOWING, Mode.LANDING])
+@pytest.mark.parametrize('flying', [True, False])
+@pytest.mark.parametrize('lifting', [True, False])
+@pytest.mark.parametrize('silent', [(), (1, 2), (0, 1, 2, 3)])
+def test_gaps_are_asked_while_a_controller_is_followed_and_are_stuck_together(
+    monkeypatch: pytest.MonkeyPatch,
+    silent: tuple[int, ...],
+    mode: Mode,
+    *,
+    lifting: bool,
+    flying: bool,
+) -> None:
+    stage, _ = active()
+    fault, look = Calls(), Calls(silent)
+    monkeypatch.setattr(stage._gap_knock, 'look', look)
+    monkeypatch.setattr(stage, '_sensing_fault', fault)
+    stage.mode, stage.flying, stage._lifting = mode, flying, lifting
+    stage.read()
+    hovers = flying and mode is Mode.FOLLOWING and not lifting
+    assert look.given == [(stage.guard.arrays, hovers)]
+    assert fault.given == ([(guard.STUCK, silent[0])] if silent else [])
+    assert stage.guard.failed == list(silent)
+    assert stage.guard.blamed == list(silent)
+
+
 def test_the_stop_is_looked_at_with_every_sample() -> None:
     stage, boards = active()
     boards.stop_pressed = True

@@ -90,6 +90,14 @@ class FaultParameters:
         unit='s',
         within=(0.0, 60.0),
     )
+    gap_silence: float = parameter(
+        0.03,
+        'two or more gap encoders that have not counted for so long in flight are asked whether '
+        'they do, by pushes to and fro that move y by about one count; twice as long after each '
+        'answer; 0: never',
+        unit='s',
+        within=(0.0, 60.0),
+    )
     friction: tuple[float, ...] = parameter(
         (0.8, 0.35, 0.35, 3.0, 3.0),
         'by how much the force on a platen that stands still may differ from the model, friction '

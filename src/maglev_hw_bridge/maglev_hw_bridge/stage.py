@@ -20,6 +20,7 @@ from maglev_hw_bridge.life_cycle import StageLife
 from maglev_hw_bridge.mode import Mode as Mode
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.sensing import guard
+from maglev_hw_bridge.sensing.gap_knock import GapKnock
 from maglev_hw_bridge.sensing.knock import Knock
 from maglev_model.axes import AXES
 from maglev_model.contract.stage import EncoderSample, Fault, StageError, Truth, motor_currents
@@ -56,6 +57,7 @@ class BridgeStage(StageLife):
         self._all_knowing = self.driver if isinstance(self.driver, Truthful) else None
         self.landing = Landing(self.parameters)
         self._knock = Knock(self.parameters)
+        self._gap_knock = GapKnock(self.parameters)
         self._zero = np.zeros(4)
         self._flowed = np.zeros(12)  # phase currents until the sample read last [A]
         self._behind = 0  # samples that this one was late by
@@ -126,16 +128,24 @@ class BridgeStage(StageLife):
             self._sensing_fault(code, index)
         if self.guard.returned and self.mode is Mode.LANDING:
             self._begin_landing()
-        silent = self._knock.look(self.guard.arrays, self.flying)
-        if silent is not None:
-            self.guard.lose(silent)
-            self._sensing_fault(guard.STUCK, silent)
+        self._ask()
         self._look_for_rest()
         if self.driver.stop_pressed:
             self._raise_fault('stop', 'the emergency stop is pressed', 'release it')
         if self.driver.late > 0.5 * self.parameters.sample_time:
             self._late()
         return EncoderSample(length[:4].copy(), length.item(4), length.item(5))
+
+    def _ask(self) -> None:
+        """Whether encoders that do not count do so when they are knocked, and go without if not."""
+        watched = self.guard.arrays
+        one = self._knock.look(watched, self.flying)
+        hovers = self.flying and self.mode is Mode.FOLLOWING and not self._lifting
+        gaps = self._gap_knock.look(watched, hovers)
+        for lost in ((one,) if one is not None else (), gaps):
+            if lost:
+                self.guard.lose(*lost)
+                self._sensing_fault(guard.STUCK, lost[0])
 
     def _keep_up(self) -> None:
         """Note how far behind its tick the sample is, and what flowed until that.
@@ -273,6 +283,7 @@ class BridgeStage(StageLife):
     def _drive(self, i_d: FloatArray, i_q: FloatArray) -> tuple[int, int]:
         """Have the amplifiers make these currents where x and z are, and what is to knock there."""
         state = self.guard.arrays
+        i_d = self._gap_knock.added(state, i_d, i_q)
         i_q = self._knock.added(state, i_d, i_q)
         return self.amplifiers.drive(i_d, i_q, state.believed[4], state.believed[5])
 

@@ -23,7 +23,7 @@ COUNT = 1e-5
 def asked(**silent: int) -> tuple[Knock, GuardArrays]:
     """Both axes and what they are watched by; ``silent`` for so many samples."""
     watched: GuardArrays = Hover().watched
-    watched.silent[:] = [silent.get('x', 0), silent.get('z', 0)]
+    watched.silent[4:] = [silent.get('x', 0), silent.get('z', 0)]
     return Knock(build(BridgeParameters, {})), watched
 
 
@@ -135,7 +135,7 @@ def test_the_hardest_moves_it_over_a_count_against_twice_the_friction(
 @pytest.mark.parametrize('axis', [0, 1])
 def test_it_is_asked_after_a_fifth_of_a_second(axis: int, silent: int, *, begins: bool) -> None:
     asking, watched = asked()
-    watched.silent[axis] = silent
+    watched.silent[4 + axis] = silent
     assert asking.look(watched, True) is None
     assert [of.under_way for of in asking._asked] == [begins and k == axis for k in range(2)]
 
@@ -153,7 +153,7 @@ def test_who_does_not_answer_is_told_and_the_other_is_not() -> None:
     asking.look(watched, True)
     found = []
     for sample in range(60):
-        watched.silent[:] = [201 + sample, 0 if sample == 10 else 201 + sample]
+        watched.silent[4:] = [201 + sample, 0 if sample == 10 else 201 + sample]
         found.append(asking.look(watched, True))
     assert found == [None] * 59 + [4]
     assert asking.look(watched, True) is None
@@ -162,7 +162,7 @@ def test_who_does_not_answer_is_told_and_the_other_is_not() -> None:
 @pytest.mark.parametrize('axis', [0, 1])
 def test_it_is_told_by_its_own_number(axis: int) -> None:
     asking, watched = asked()
-    watched.silent[axis] = 200
+    watched.silent[4 + axis] = 200
     found = [asking.look(watched, True) for _ in range(61)]
     assert found == [None] * 60 + [4 + axis]
 
@@ -185,7 +185,7 @@ def test_where_no_edge_was_seen_it_is_pushed_where_it_leans(
     watched.believed[4:] = 0.0
     watched.disturbance[1 + axis] = 0.3
     watched.acceleration[1 + axis] = 0.3 + pushed
-    watched.silent[axis] = 200
+    watched.silent[4 + axis] = 200
     asking.look(watched, True)
     assert asking._asked[axis].acceleration == pytest.approx(way * asking._asked[axis]._softest)
 
@@ -199,12 +199,12 @@ def along(i_d: np.ndarray, i_q: np.ndarray, watched: GuardArrays) -> np.ndarray:
 @pytest.mark.parametrize(('axis', 'other'), [(0, 1), (1, 0)])
 def test_who_has_answered_is_not_pushed_on(axis: int, other: int) -> None:
     asking, watched = asked()
-    watched.silent[other] = 200
+    watched.silent[4 + other] = 200
     asking.look(watched, True)
-    watched.silent[other] = 0
+    watched.silent[4 + other] = 0
     for _ in range(2):
         asking.look(watched, True)
-    watched.silent[axis] = 200
+    watched.silent[4 + axis] = 200
     asking.look(watched, True)
     i_d, i_q = np.full(4, 0.3), np.zeros(4)
     more = along(i_d, asking.added(watched, i_d, i_q), watched)
@@ -217,7 +217,7 @@ def test_who_was_asked_when_the_flight_ended_is_not_pushed_in_the_next() -> None
     asking.look(watched, True)
     watched.silent[:] = 0
     asking.look(watched, False)
-    watched.silent[0] = 200
+    watched.silent[4] = 200
     asking.look(watched, True)
     i_d, i_q = np.full(4, 0.3), np.zeros(4)
     more = along(i_d, asking.added(watched, i_d, i_q), watched)

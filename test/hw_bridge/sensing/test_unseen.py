@@ -17,7 +17,8 @@ SHOWS = np.array([30] * 4 + [40] * 2)  # counts off the truth
 def hovering(friction: float, stuck: tuple[int, ...]) -> Flight:
     rubbing = {'emulation.guide.coulomb': (friction * COULOMB).tolist()}
     noise = {f'emulation.encoder.{which}_noise': 2e-6 for which in ('gap', 'horizontal')}
-    flight = Flight(hover(0.025, 5e-6, 5e-6), {**rubbing, **noise})
+    never_asked = {'fault.gap_silence': 0.0}
+    flight = Flight(hover(0.025, 5e-6, 5e-6), {**rubbing, **noise, **never_asked})
     flight.run(400)
     flight.boards.stuck[list(stuck)] = True
     return flight

@@ -30,7 +30,7 @@ from maglev_hw_bridge.sensing.standing_still import (
     look,
     lose,
 )
-from maglev_model.axes import FloatArray, Y
+from maglev_model.axes import PHI, THETA, FloatArray, Y
 from maglev_model.compiled import borrowing, compiled
 from maglev_model.compiled.records import Block
 
@@ -186,8 +186,11 @@ def _lose(block: Block, encoder: int) -> None:
     """See :meth:`Guard.lose`."""
     g: GuardArrays = block[0]
     lose(g, encoder)
-    for i in range(6):
-        g.blamed[i] = 1 if i == encoder else 0
+    g.blamed[encoder] = 1
+    if encoder < 4:
+        observer.bound_disturbance(g, PHI)
+        observer.bound_disturbance(g, THETA)
+        return
     g.position[encoder - 3] = g.believed[encoder]
     g.rate[encoder - 3] = g.disturbance[encoder - 3] = 0.0
 
@@ -249,9 +252,11 @@ class Guard:
         """Judge one sample; see :func:`watch`."""
         return watch(self.arrays.block, length, current, flying, behind)
 
-    def lose(self, encoder: int) -> None:
-        """Do without an encoder, x (4) or z (5), from now on; its axis rests where it was read."""
-        _lose(self.arrays.block, encoder)
+    def lose(self, *encoders: int) -> None:
+        """Do without these from now on; x (4) and z (5) rest where they were read."""
+        self.arrays.blamed[:] = 0
+        for encoder in encoders:
+            _lose(self.arrays.block, encoder)
 
     @property
     def returned(self) -> bool:

@@ -50,7 +50,7 @@ class GuardArrays(ObserverArrays):
     rigid: bool  # whether four believed gaps must be those of a rigid platen
     residual_then: Annotated[FloatArray, 4]  # when a gap encoder counted last [m]
     unseen: Annotated[FloatArray, 6]  # how far it should have moved at least since its last count
-    silent: Annotated[NDArray[np.int64], 2]  # samples in flight in which x, z have not counted
+    silent: Annotated[NDArray[np.int64], 6]  # samples in flight in which it has not counted
     stood: Annotated[NDArray[np.int8], 2]  # 1 where x, z are lost because they stood still
     read: Annotated[FloatArray, 2]  # by x, z in the last sample, believed or not [m]
     heard: Annotated[NDArray[np.int64], 2]  # counts one way since they are lost, signed

@@ -27,6 +27,17 @@ _COUNTS = 1.2  # by which the platen is moved at least, by half of the hardest
 _HARDEST = 2.0
 
 
+def samples_to_push(period: float) -> int:
+    """In either direction, by the period of the samples [s]."""
+    return max(round(_PUSH / period), 2)
+
+
+def hardest_push(parameters: BridgeParameters, axis: int, count: float) -> float:
+    """By half of which a platen that friction holds moves more than a ``count`` [m]; in m/s²."""
+    push = parameters.sample_time * samples_to_push(parameters.sample_time)
+    return _HARDEST * (parameters.fault.friction[axis] + 2.0 * _COUNTS * count / push**2)
+
+
 @compiled
 def _thrust(machine: Machine, position: FloatArray, i_d: FloatArray, axis: int) -> float:
     """Acceleration along x or z by 1 A of i_q in both its motors, which alone make it [m/s²/A]."""
@@ -36,22 +47,15 @@ def _thrust(machine: Machine, position: FloatArray, i_d: FloatArray, axis: int) 
     return float(output_accelerations(machine, y, phi, theta, i_d, i_q)[axis])
 
 
-class _Asked:
-    """Knocks at x or at z, each harder than the one before."""
+class Pushes:
+    """To and fro, each pair harder than the one before, until what is pushed answers."""
 
-    def __init__(self, axis: int, hardest: float, duration: int) -> None:
-        """``hardest`` push [m/s²], in samples ``duration``."""
-        self.axis = axis
-        self._softest, self._duration = hardest / _GROWTH ** (_KNOCKS - 1), duration
-        self._reading = 0.0  # [m]
-        self.passed = 0.0  # which way the last edge was: it is nearest going back
+    def __init__(self, hardest: float, duration: int, knocks: int, growth: float) -> None:
+        """``hardest`` push [m/s²], the last of ``knocks``; in samples ``duration``."""
+        self._softest, self._duration = hardest / growth ** (knocks - 1), duration
+        self._most, self._growth = knocks, growth
         self.begin(0.0)
         self.under_way = False
-
-    def follow(self, reading: float) -> None:
-        if reading != self._reading:
-            self.passed = math.copysign(1.0, reading - self._reading)
-            self._reading = reading
 
     def begin(self, sign: float) -> None:
         """Knock softly that way first, unanswered so far."""
@@ -69,13 +73,13 @@ class _Asked:
         self._samples += 1
         if counted and not self._answered:
             self._answered, self._turn = True, min(self._turn, self._samples)
-        last = self._knocks == _KNOCKS
+        last = self._knocks == self._most
         if self._samples < 2 * self._turn + (self._duration if last and not self._answered else 0):
             return False
         if self._answered or last:
             self.under_way = False
             return not self._answered
-        self._knock(_GROWTH * self._push)
+        self._knock(self._growth * self._push)
         return False
 
     @property
@@ -86,22 +90,37 @@ class _Asked:
         return -self._push if self._samples < 2 * self._turn else 0.0
 
 
+class _Asked(Pushes):
+    """Knocks at x or at z."""
+
+    def __init__(self, axis: int, hardest: float, duration: int) -> None:
+        """``hardest`` push [m/s²], in samples ``duration``."""
+        super().__init__(hardest, duration, _KNOCKS, _GROWTH)
+        self.axis = axis
+        self._reading = 0.0  # [m]
+        self.passed = 0.0  # which way the last edge was: it is nearest going back
+
+    def follow(self, reading: float) -> None:
+        if reading != self._reading:
+            self.passed = math.copysign(1.0, reading - self._reading)
+            self._reading = reading
+
+
 class Knock:
     """Both axes: :meth:`look` once a sample, then :meth:`added` to what is commanded."""
 
     def __init__(self, parameters: BridgeParameters) -> None:
         fault, period = parameters.fault, parameters.sample_time
-        duration = max(round(_PUSH / period), 2)
+        duration = samples_to_push(period)
         self._patience = round(fault.silence / period)
         self._limit = fault.command_limit
         self._machine = machine_constants(parameters.machine)
         self._i_q = np.zeros(4)
-        count, push = parameters.encoder.resolution, duration * period
         nearest = np.array([parameters.machine.gap_min, 0.0, 0.0, 0.0, 0.0])
         self._asked = tuple(
             _Asked(
                 axis,
-                _HARDEST * (fault.friction[axis] + 2.0 * _COUNTS * count[3 + axis] / push**2),
+                hardest_push(parameters, axis, parameters.encoder.resolution[3 + axis]),
                 duration,
             )
             for axis in (X, Z)
@@ -113,7 +132,7 @@ class Knock:
         for asked in self._asked:
             asked.follow(watched.believed[3 + asked.axis])
             asked.under_way = asked.under_way and flying
-            silent = watched.silent[asked.axis - X]
+            silent = watched.silent[3 + asked.axis]
             if asked.under_way:
                 if asked.go_on(silent == 0):
                     return 3 + asked.axis

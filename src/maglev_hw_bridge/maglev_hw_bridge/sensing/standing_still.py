@@ -69,10 +69,9 @@ def look(g: GuardArrays, flying: bool, counted: Flags) -> None:
             g.unseen[i] += _least_step(g, i)
         if i < 4 and (counted[i] or not g.rigid):
             g.residual_then[i] = residual
-        if i >= 4:
-            asked = flying and settled and g.trust[i] != LOST
-            asked = asked and not (counted[i] or observer.supported(g, Y))
-            g.silent[i - 4] = g.silent[i - 4] + 1 if asked else 0
+        asked = flying and settled and g.trust[i] != LOST
+        asked = asked and not (counted[i] or observer.supported(g, Y))
+        g.silent[i] = g.silent[i] + 1 if asked else 0
         g.probation[i] = max(g.probation[i] - 1, 0)
 
 

@@ -1,0 +1,104 @@
+"""Asks gap encoders that have not counted for a while in flight whether they count at all.
+
+Where a platen hovers some gap or other goes to and fro over the edge of a count, and of neighbours
+hardly any two are silent for long. If two or more are stuck the controller leaves the platen where
+they do not show, and within friction neither the others nor the model can tell. So all gaps at once
+are knocked, by a push along y to and fro, softly first, then twice as hard, and again. Guides that
+stick may keep sound encoders silent: each time all have answered, they are given twice as long.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.sensing.guard_arrays import LOST, GuardArrays
+from maglev_hw_bridge.sensing.knock import Pushes, hardest_push, samples_to_push
+from maglev_model.axes import FloatArray, Y
+from maglev_model.compiled import compiled
+from maglev_model.machine import Machine, machine_constants
+from maglev_model.platen import output_accelerations
+
+_KNOCKS, _GROWTH = 3, 2.0
+_OPPOSITE = 2.0  # as patient with two that face each other: the level of a tilt may hold both still
+_LONGEST = 128.0  # and as often as this at the most, however often they have answered
+
+
+@compiled
+def _lift(machine: Machine, position: FloatArray, i_d: FloatArray, i_q: FloatArray) -> float:
+    """Acceleration along y by 1 A of i_d more in every motor [m/s²/A]."""
+    y, phi, theta = position[0], position[3], position[4]
+    more = output_accelerations(machine, y, phi, theta, i_d + 0.5, i_q)
+    less = output_accelerations(machine, y, phi, theta, i_d - 0.5, i_q)
+    return float(more[0] - less[0])
+
+
+class GapKnock:
+    """All gaps: :meth:`look` once a sample, then :meth:`added` to what is commanded."""
+
+    def __init__(self, parameters: BridgeParameters) -> None:
+        self._patience = round(parameters.fault.gap_silence / parameters.sample_time)
+        self._limit = parameters.fault.command_limit
+        self._machine = machine_constants(parameters.machine)
+        count = max(parameters.encoder.resolution[:4])
+        self._pushes = Pushes(
+            hardest_push(parameters, Y, count),
+            samples_to_push(parameters.sample_time),
+            _KNOCKS,
+            _GROWTH,
+        )
+        self._asked: tuple[int, ...] = ()
+        self._samples = 0  # since they are
+        self._face = False  # whether these are two that face each other
+        self._answered = [0, 0]  # how often, by that
+        nowhere = np.array([parameters.machine.gap_max, 0.0, 0.0, 0.0, 0.0])
+        _lift(self._machine, nowhere, np.zeros(4), np.zeros(4))  # compiled, or loaded, before
+
+    def look(self, watched: GuardArrays, flying: bool) -> tuple[int, ...]:
+        """One sample; which have not counted while all were knocked. Ends with the flight."""
+        if not flying or self._patience == 0:
+            self._pushes.under_way = False
+            self._answered[:] = 0, 0
+            return ()
+        if not self._pushes.under_way:
+            self._ask(watched)
+            return ()
+        self._samples += 1
+        if self._pushes.go_on(not self._silent(watched, self._samples, self._asked)):
+            return self._silent(watched, self._samples)
+        if not self._pushes.under_way:
+            self._answered[self._face] += 1
+        return ()
+
+    @staticmethod
+    def _silent(
+        watched: GuardArrays, samples: int, gaps: tuple[int, ...] = (0, 1, 2, 3)
+    ) -> tuple[int, ...]:
+        """Which have not counted for so many samples, though they are believed."""
+        silent, trust = watched.silent, watched.trust
+        return tuple(i for i in gaps if silent[i] >= samples and trust[i] != LOST)
+
+    def _ask(self, watched: GuardArrays) -> None:
+        """Begin to knock where two or more have been silent for too long."""
+        for face in (False, True):
+            silent = self._silent(watched, self.patience(face))
+            if len(silent) >= 2 and face == (silent in ((0, 2), (1, 3))):
+                self._asked, self._face, self._samples = silent, face, 0
+                self._pushes.begin(1.0)
+                return
+
+    def patience(self, face: bool) -> int:
+        """With two that face each other, or with others [samples]."""
+        longer = min(2.0 ** self._answered[face], _LONGEST)
+        return round((_OPPOSITE if face else 1.0) * longer * self._patience)
+
+    def added(self, watched: GuardArrays, i_d: FloatArray, i_q: FloatArray) -> FloatArray:
+        """``i_d`` (4,) [A] with what knocks: nothing while the motors have nothing left for it."""
+        if not self._pushes.under_way:
+            return i_d
+        lift = _lift(self._machine, watched.position, i_d, i_q)
+        pushed: FloatArray = i_d + self._pushes.acceleration / lift
+        if np.max(np.hypot(pushed, i_q)) <= self._limit:
+            return pushed
+        self._pushes.under_way = False
+        return i_d
