@@ -45,7 +45,7 @@ _CAMPAIGN = ('test/study/faults/test_campaign.py',)
 _BRIDGE = (
     *bridge_tests('encoders', 'leaps', 'doubt', 'roll_call', 'standing_still', 'watch'),
     *bridge_tests('observer', 'board', 'way_down', 'unseen', 'rough_rig', 'amplifiers', 'guard'),
-    *bridge_tests('knock', 'resting', 'life_cycle', 'memory', 'landing'),
+    *bridge_tests('knock', 'gap_knock', 'resting', 'life_cycle', 'memory', 'landing'),
     'test/model/contract/test_stage.py',
     *bridge_tests('faults', 'sensing', 'driver_calls', 'lines_and_offsets', 'boards_that_fail'),
     'test/study/faults/test_judge.py',
@@ -59,7 +59,8 @@ LOOKED_AT_BY: dict[str, tuple[tuple[str, ...], ...]] = {
         f'maglev_hw_bridge.{name}': (_BRIDGE, _CAMPAIGN)
         for name in (
             *('sensing.guard', 'sensing.leaps', 'sensing.standing_still', 'sensing.observer'),
-            *('sensing.knock', 'landing', 'stage', 'life_cycle', 'amplifiers', 'encoders'),
+            *('sensing.knock', 'sensing.gap_knock', 'landing', 'stage', 'life_cycle'),
+            *('amplifiers', 'encoders'),
             *('board', 'drivers.quanser'),
         )
     },

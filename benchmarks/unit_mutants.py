@@ -59,6 +59,7 @@ TESTS: dict[str, tuple[str, ...]] = {
     'maglev_hw_bridge.sensing.observer': bridge_tests('observer', 'guard'),
     'maglev_hw_bridge.sensing.leaps': bridge_tests('leaps'),
     'maglev_hw_bridge.sensing.knock': bridge_tests('knock_bounds'),
+    'maglev_hw_bridge.sensing.gap_knock': bridge_tests('gap_knock_bounds'),
     'maglev_hw_bridge.sensing.standing_still': bridge_tests(
         'doubt', 'roll_call', 'standing_still', 'all_missed'
     ),

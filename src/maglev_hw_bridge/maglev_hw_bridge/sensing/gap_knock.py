@@ -1,10 +1,10 @@
 """Asks gap encoders that have not counted for a while in flight whether they count at all.
 
-Where a platen hovers some gap or other goes to and fro over the edge of a count, and of neighbours
-hardly any two are silent for long. If two or more are stuck the controller leaves the platen where
-they do not show, and within friction neither the others nor the model can tell. So all gaps at once
-are knocked, by a push along y to and fro, softly first, then twice as hard, and again. Guides that
-stick may keep sound encoders silent: each time all have answered, they are given twice as long.
+Where a platen hovers, some gap or other goes to and fro over the edge of a count. If two or more
+are stuck the controller leaves the platen where they do not show, and within friction neither the
+others nor the model can tell. So all gaps at once are knocked, by a push along y to and fro, softly
+first, then twice as hard, and again. Sound ones may be silent together too, most of all where
+guides stick: each time all have answered, they are given twice as long.
 """
 
 from __future__ import annotations
@@ -51,8 +51,8 @@ class GapKnock:
         self._samples = 0  # since they are
         self._face = False  # whether these are two that face each other
         self._answered = [0, 0]  # how often, by that
-        nowhere = np.array([parameters.machine.gap_max, 0.0, 0.0, 0.0, 0.0])
-        _lift(self._machine, nowhere, np.zeros(4), np.zeros(4))  # compiled, or loaded, before
+        anywhere = np.full(5, parameters.machine.gap_max)
+        _lift(self._machine, anywhere, anywhere, anywhere)  # compiled, or loaded, before it is due
 
     def look(self, watched: GuardArrays, flying: bool) -> tuple[int, ...]:
         """One sample; which have not counted while all were knocked. Ends with the flight."""
