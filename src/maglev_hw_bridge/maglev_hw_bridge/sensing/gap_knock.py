@@ -80,6 +80,8 @@ class GapKnock:
 
     def _ask(self, watched: GuardArrays) -> None:
         """Begin to knock where two or more have been silent for too long."""
+        if sorted(watched.silent[:4].tolist())[2] < self._patience:  # at most one
+            return
         for face in (False, True):
             silent = self._silent(watched, self.patience(face))
             if len(silent) >= 2 and face == (silent in ((0, 2), (1, 3))):
