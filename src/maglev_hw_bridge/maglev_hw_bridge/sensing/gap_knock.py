@@ -20,8 +20,8 @@ from maglev_model.machine import Machine, machine_constants
 from maglev_model.platen import output_accelerations
 
 _KNOCKS, _GROWTH = 3, 2.0
-_OPPOSITE = 2.0  # as patient with two that face each other: the level of a tilt may hold both still
-_LONGEST = 128.0  # and as often as this at the most, however often they have answered
+_FACE_TO_FACE = 2.0  # times the patience with others: of a tilt alone such two may well be silent
+_MOST_PATIENT = 128.0  # times that of the beginning, however often they have answered
 
 
 @compiled
@@ -91,8 +91,8 @@ class GapKnock:
 
     def patience(self, face: bool) -> int:
         """With two that face each other, or with others [samples]."""
-        longer = min(2.0 ** self._answered[face], _LONGEST)
-        return round((_OPPOSITE if face else 1.0) * longer * self._patience)
+        longer = min(2.0 ** self._answered[face], _MOST_PATIENT)
+        return round((_FACE_TO_FACE if face else 1.0) * longer * self._patience)
 
     def added(self, watched: GuardArrays, i_d: FloatArray, i_q: FloatArray) -> FloatArray:
         """``i_d`` (4,) [A] with what knocks: nothing while the motors have nothing left for it."""
