@@ -142,10 +142,14 @@ class BridgeStage(StageLife):
         one = self._knock.look(watched, self.flying)
         hovers = self.flying and self.mode is Mode.FOLLOWING and not self._lifting
         gaps = self._gap_knock.look(watched, hovers)
-        for lost in ((one,) if one is not None else (), gaps):
-            if lost:
-                self.guard.lose(*lost)
-                self._sensing_fault(guard.STUCK, lost[0])
+        if one is not None:
+            self._do_without(one)
+        if gaps:
+            self._do_without(*gaps)
+
+    def _do_without(self, *encoders: int) -> None:
+        self.guard.lose(*encoders)
+        self._sensing_fault(guard.STUCK, encoders[0])
 
     def _keep_up(self) -> None:
         """Note how far behind its tick the sample is, and what flowed until that.

@@ -20,7 +20,7 @@ from maglev_model.machine import Machine, machine_constants
 from maglev_model.platen import output_accelerations
 
 _KNOCKS, _GROWTH = 3, 2.0
-_FACE_TO_FACE = 2.0  # times the patience with others: of a tilt alone such two may well be silent
+_OPPOSITE = 2.0  # times the patience with others: two gaps of one tilt are silent together for long
 _MOST_PATIENT = 128.0  # times that of the beginning, however often they have answered
 
 
@@ -49,7 +49,7 @@ class GapKnock:
         )
         self._asked: tuple[int, ...] = ()
         self._samples = 0  # since they are
-        self._face = False  # whether these are two that face each other
+        self._opposite = False  # whether these are two gaps of one tilt
         self._answered = [0, 0]  # how often, by that
         anywhere = np.full(5, parameters.machine.gap_max)
         _lift(self._machine, anywhere, anywhere, anywhere)  # compiled, or loaded, before it is due
@@ -67,7 +67,7 @@ class GapKnock:
         if self._pushes.go_on(not self._silent(watched, self._samples, self._asked)):
             return self._silent(watched, self._samples)
         if not self._pushes.under_way:
-            self._answered[self._face] += 1
+            self._answered[self._opposite] += 1
         return ()
 
     @staticmethod
@@ -82,17 +82,17 @@ class GapKnock:
         """Begin to knock where two or more have been silent for too long."""
         if sorted(watched.silent[:4].tolist())[2] < self._patience:  # at most one
             return
-        for face in (False, True):
-            silent = self._silent(watched, self.patience(face))
-            if len(silent) >= 2 and face == (silent in ((0, 2), (1, 3))):
-                self._asked, self._face, self._samples = silent, face, 0
+        for opposite in (False, True):
+            silent = self._silent(watched, self.patience(opposite))
+            if len(silent) >= 2 and opposite == (silent in ((0, 2), (1, 3))):
+                self._asked, self._opposite, self._samples = silent, opposite, 0
                 self._pushes.begin(1.0)
                 return
 
-    def patience(self, face: bool) -> int:
-        """With two that face each other, or with others [samples]."""
-        longer = min(2.0 ** self._answered[face], _MOST_PATIENT)
-        return round((_FACE_TO_FACE if face else 1.0) * longer * self._patience)
+    def patience(self, opposite: bool) -> int:
+        """With two gaps of one tilt, or with others [samples]."""
+        longer = min(2.0 ** self._answered[opposite], _MOST_PATIENT)
+        return round((_OPPOSITE if opposite else 1.0) * longer * self._patience)
 
     def added(self, watched: GuardArrays, i_d: FloatArray, i_q: FloatArray) -> FloatArray:
         """``i_d`` (4,) [A] with what knocks: nothing while the motors have nothing left for it."""
