@@ -231,16 +231,23 @@ def test_out_of_range_is_a_fault_but_for_what_lands(code: int) -> None:
     assert stage.fault is None
 
 
+@pytest.mark.parametrize('y', [0.025, 0.0305])
 @pytest.mark.parametrize('lost', [(0,), (0, 1, 2, 3)])
-def test_without_any_gap_there_is_no_landing(lost: tuple[int, ...]) -> None:
+def test_without_any_gap_only_what_falls_down_by_itself_is_cut(
+    lost: tuple[int, ...], y: float
+) -> None:
     stage, _ = active()
     aloft(stage)
+    stage.guard.arrays.position[0] = y
     stage.guard.arrays.trust[list(lost)] = LOST
     stage.guard.arrays.blamed[list(lost)] = 1
     stage._sensing_fault(guard.STUCK, 0)
     assert stage.fault is not None
-    assert stage.fault.cut == (len(lost) == 4)
-    assert stage.mode is (Mode.DISABLED if len(lost) == 4 else Mode.LANDING)
+    falls = len(lost) == 4 and y > 0.03
+    assert stage.fault.cut == falls
+    assert stage.mode is (Mode.DISABLED if falls else Mode.LANDING)
+    assert ('pushed down unseen' in stage.fault.reason) == (len(lost) == 4 and not falls)
+    assert ('strikes the lower stop at about' in stage.fault.reason) == (len(lost) == 4)
 
 
 def blamed(stage: BridgeStage, *encoders: int, trust: int = LOST) -> None:

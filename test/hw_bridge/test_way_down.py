@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 
 from maglev_hw_bridge.landing import Landing, impact_of_cut, impacts_of_cut
 from maglev_hw_bridge.parameters import BridgeParameters
-from maglev_model.axes import THETA, X, Z
+from maglev_model.axes import THETA, X, Y, Z
 from maglev_model.currents import exact_currents
 from maglev_model.inverse import CurrentLimits
 from maglev_model.machine import machine_constants
@@ -60,7 +60,10 @@ def test_it_follows_a_smooth_way_by_position_and_rate(
     blind: np.ndarray,
     share: float,
 ) -> None:
-    """Braking over half of what the rate would cover, the tilts to 0, then down below the stop."""
+    """Braking over half of what the rate would cover, the tilts to 0, then down below the stop.
+
+    Where y is not seen, down by a push instead.
+    """
     start = PLACE + [2e-3, 5e-3, 5e-3, 5e-4, 1e-3] * off
     rate = rate * [0.01, 0.05, 0.05, 0.002, 0.01]
     landing = Landing(PARAMETERS)
@@ -92,6 +95,11 @@ def test_it_follows_a_smooth_way_by_position_and_rate(
     for axis in (X, Z):
         if abs(error[axis]) < 2e-5 and abs(way[axis, 1]) + abs(speed[axis]) < 2e-3:
             wanted[axis] = 0.0
+    place = position.copy()
+    if blind[Y]:
+        held = position[0] > GAP_MAX - 1e-3 and speed[0] >= 0.0
+        place[0] = landing.arrays.balance if held else position[0]
+        wanted[0] = (2.0 if held else 4.0) - push[0]
     carry = np.array([0.0, -2.0, 2.0, -1.0, 1.0])[blind].sum()
     limits = CurrentLimits(
         LAW.current,
@@ -100,9 +108,13 @@ def test_it_follows_a_smooth_way_by_position_and_rate(
         0.5 + 0.5 * float(np.clip(carry, -1.0, 1.0)),
         0.95 if position[0] < landing.arrays.balance else 0.5,
     )
-    i_d, i_q, _ = exact_currents(MACHINE, position[None], wanted[None], limits)
+    i_d, i_q, _ = exact_currents(MACHINE, place[None], wanted[None], limits)
     np.testing.assert_allclose(landing.direct_current, i_d[0], atol=1e-9)
     np.testing.assert_allclose(landing.quadrature_current, i_q[0], atol=1e-9)
+    if blind[Y]:
+        assert not landing.astray
+        assert done == (time > 0.5)
+        return
     sooner = (blind[X] or blind[Z]) and not blind[THETA] and position[0] > GAP_MAX - 5e-5
     assert done == (sooner or time > braking + descent + LAW.settle_time)
 

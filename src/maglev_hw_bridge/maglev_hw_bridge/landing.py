@@ -1,8 +1,9 @@
 """Landing without a controller: brake, level, descend, and end the current on the lower stop.
 
 A simple law that needs nothing but the encoders: proportional and rate feedback on a smooth way
-down, and the exact inverse of (1), (2) with gravity and the springs of (7). Also what a cut would
-do: the speed at which the platen then strikes a stop.
+down, and the exact inverse of (1), (2) with gravity and the springs of (7). A platen whose air gap
+no encoder shows is pushed down. Also what a cut would do: the speed at which the platen then
+strikes a stop.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numpy as np
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.sensing.observer import Flags
 from maglev_model.axes import PHI, THETA, FloatArray, X, Z
-from maglev_model.compiled import compiled
+from maglev_model.compiled import borrowing, compiled
 from maglev_model.compiled.records import Block, Record
 from maglev_model.inverse import Answer, CurrentLimits, exact_inverse
 from maglev_model.machine import Machine, machine_constants
@@ -43,6 +44,10 @@ _SOFT = 2e-4  # so near its stop what turns is not waited for [m]
 _TURNING = 0.08  # that fast it is pulled over the stop's edge [rad/s]
 _TILT = 0.95  # share of the attraction that tilts may take there
 _BRAKING_UPWARD = 0.1  # of y [s]
+_PUSH = 4.0  # downwards, of a platen whose gap nothing shows [m/s²]
+_SURELY_DOWN = 1e-3  # so near the lower stop the model must have it by then [m]
+_HOLD, _HELD = 2.0, 0.15  # it is held there, if at the balance at least so hard [m/s²], [s]
+_LONGEST_PUSH = 0.5  # [s]
 _SEATED = 5e-5  # so near the lower stop a cut is soft [m]
 _FREE_STEP = 1e-4  # of the motion without current [s]
 _LONGEST_FALL = 10.0  # [s]
@@ -74,6 +79,8 @@ class LandingArrays(Record):
     balance: float  # air gap below which the magnets pull it up [m]
     stray: Annotated[FloatArray, 5]  # farther from it the platen is not held any more [m, rad]
     astray: bool  # it is, a result
+    unseen: bool  # no encoder shows y
+    held: float  # for which time, where y is unseen [s]
     direct: Annotated[FloatArray, 4]  # i_d of motors 1..4 [A], the result
     quadrature: Annotated[FloatArray, 4]  # i_q
 
@@ -83,15 +90,45 @@ def land(block: Block, position: FloatArray, rate: FloatArray, disturbance: Floa
     """Write the currents of the next sample of the way down; true when the landing is over.
 
     ``position``, ``rate`` and ``disturbance`` (5,) [m, rad] and by s and s². No motor gets more
-    than the limit, and what carries comes first. Along x and z what stands still is not pushed, and
-    no friction made up for, which would grow with the push: should the encoder be stuck, the platen
-    would at last slide off unseen.
+    than the limit, and what carries comes first.
     """
     landing: LandingArrays = block[0]
     landing.elapsed += landing.period
-    time = landing.elapsed
-    wanted = np.empty(5)
     thrown_up = position[0] < landing.balance  # by a cut
+    place, wanted = position.copy(), np.empty(5)
+    _follow(landing, position, rate, disturbance, thrown_up, wanted)
+    if landing.unseen:
+        _push(landing, position, rate, disturbance, place, wanted)
+    tilt = _TILT if thrown_up else 0.5
+    exact_inverse(
+        machine_from_array(landing.machine),
+        CurrentLimits(landing.current_limit, 1.0, LEAST_ATTRACTION, landing.along_z, tilt),
+        np.ones(5),
+        place,
+        wanted,
+        Answer(landing.direct[:], landing.quadrature[:], np.empty(5), np.empty(2)),
+    )
+    if landing.unseen:
+        return bool(landing.held > _HELD or landing.elapsed > _LONGEST_PUSH)
+    longest = landing.descent_start + landing.descent_time + landing.settle_time
+    return landing.elapsed > longest or position[0] > landing.end
+
+
+@borrowing
+def _follow(
+    landing: LandingArrays,
+    position: FloatArray,
+    rate: FloatArray,
+    disturbance: FloatArray,
+    thrown_up: bool,
+    wanted: FloatArray,
+) -> None:
+    """The accelerations, ``wanted`` (5,), that keep the platen on its way, and whether it is there.
+
+    Along x and z what stands still is not pushed, and no friction made up for, which would grow
+    with the push: should the encoder be stuck, the platen would at last slide off unseen.
+    """
+    time = landing.elapsed
     down = position[0] > landing.floor - _SOFT
     for axis in range(5):
         left, velocity, acceleration = quintic_to_zero(
@@ -121,17 +158,29 @@ def land(block: Block, position: FloatArray, rate: FloatArray, disturbance: Floa
             wanted[axis] -= disturbance[axis]
         elif abs(target - position[axis]) < _PLACE and abs(velocity) + abs(rate[axis]) < _REST:
             wanted[axis] = 0.0
-    tilt = _TILT if thrown_up else 0.5
-    exact_inverse(
-        machine_from_array(landing.machine),
-        CurrentLimits(landing.current_limit, 1.0, LEAST_ATTRACTION, landing.along_z, tilt),
-        np.ones(5),
-        position,
-        wanted,
-        Answer(landing.direct[:], landing.quadrature[:], np.empty(5), np.empty(2)),
-    )
-    over = time > landing.descent_start + landing.descent_time + landing.settle_time
-    return over or position[0] > landing.end
+
+
+@borrowing
+def _push(
+    landing: LandingArrays,
+    position: FloatArray,
+    rate: FloatArray,
+    disturbance: FloatArray,
+    place: FloatArray,
+    wanted: FloatArray,
+) -> None:
+    """Push down, in place of a way down, what only the model tells of; ``place`` (5,) as well.
+
+    What the model is off by doubles in some 20 ms, so nobody knows when the platen arrives, and
+    what brakes it then lifts one that has arrived already. Once the model has it down it is held by
+    currents that push it down even from where the magnets just carry it.
+    """
+    landing.astray = False
+    arrived = position[0] > landing.floor - _SURELY_DOWN and rate[0] >= 0.0
+    if arrived or landing.held > 0.0:
+        landing.held += landing.period
+        place[0] = landing.balance
+    wanted[0] = (_HOLD if landing.held > 0.0 else _PUSH) - disturbance[0]
 
 
 class Landing:
@@ -201,7 +250,8 @@ class Landing:
         way.level[3:] = 0.0
         way.offset[:] = position - way.level
         way.speed[:] = rate
-        way.elapsed, way.astray = 0.0, False
+        way.elapsed, way.astray, way.held = 0.0, False, 0.0
+        way.unseen = bool(blind[0])
 
     def step(self, position: FloatArray, rate: FloatArray, disturbance: FloatArray) -> bool:
         """Compute the currents of the next sample; true when the landing is over."""
@@ -253,6 +303,17 @@ def impact_of_cut(
     return abs(speed), 'upper' if end <= machine.gap_min else 'lower'
 
 
+def impact_of_push(parameters: BridgeParameters, y: float, speed: float) -> float:
+    """Speed [m/s] at which a platen that is pushed down strikes its lower stop; arguments as above.
+
+    That is what the push would give the model; of one that is not known to be anywhere the most.
+    """
+    machine = parameters.machine
+    height = machine.gap_max - (max(y, machine.gap_min) if math.isfinite(y) else machine.gap_min)
+    begun = speed if math.isfinite(speed) else 0.0
+    return math.sqrt(begun**2 + 2.0 * _PUSH * max(height, 0.0))
+
+
 def _fastest(parameters: BridgeParameters) -> float:
     """Speed that no free fall between the stops reaches [m/s]: nowhere is the pull harder."""
     machine, zero = parameters.machine, np.zeros(4)
@@ -285,3 +346,9 @@ def impacts_of_cut(parameters: BridgeParameters, y: float, speed: float) -> dict
     likely, stop = impact_of_cut(parameters, y, speed)
     found = {stop: speed for speed, stop in falls} | {stop: likely}
     return dict(sorted(found.items(), key=lambda one: -one[1]))
+
+
+def push_is_softer(parameters: BridgeParameters, y: float, speed: float) -> bool:
+    """Whether a platen that nobody sees is to be pushed down; a cut may strike harder then."""
+    hardest = max(impacts_of_cut(parameters, y, speed).values())
+    return impact_of_push(parameters, y, speed) < hardest

@@ -1,8 +1,8 @@
 """The real stage behind the stage contract: encoders, commutation, amplifiers, boards and faults.
 
-While boards and amplifiers are sound and at least one gap encoder tells where the platen is, every
-fault ends in a landing that the bridge makes by itself; otherwise the current is cut. Either is
-latched until :meth:`reset`.
+While boards and amplifiers are sound every fault ends in a landing that the bridge makes by itself,
+or in a push down where no gap encoder tells where the platen is; otherwise the current is cut.
+Either is latched until :meth:`reset`.
 """
 
 from __future__ import annotations
@@ -378,10 +378,10 @@ class BridgeStage(StageLife):
             self._raise_fault('current', *why)
             self._name_too(lands_for, (code, index), *why)
         else:
-            why = faults.encoder_fault(code, self.guard)
             blind = self.guard.blind
-            self._raise_fault('encoder', *why, cut=bool(blind[0]))
-            self._name_too(lands_for, (code, *self.guard.blamed), *why)
+            reason, remedy, cut = faults.encoder_fault(code, self.guard, self.parameters)
+            self._raise_fault('encoder', reason, remedy, cut)
+            self._name_too(lands_for, (code, *self.guard.blamed), reason, remedy)
             if self.mode is Mode.LANDING and code != guard.RESIDUAL and blind.any():
                 self._begin_landing()
 
