@@ -64,7 +64,7 @@ TESTS: dict[str, tuple[str, ...]] = {
         'doubt', 'roll_call', 'standing_still', 'all_missed'
     ),
     'maglev_hw_bridge.sensing.guard': bridge_tests('watch', 'guard'),
-    'maglev_hw_bridge.landing': bridge_tests('way_down', 'way_down_bounds'),
+    'maglev_hw_bridge.landing': bridge_tests('way_down', 'way_down_bounds', 'push_down'),
 }
 """Modules that are compiled, and their own tests, which do not fly."""
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from bridge_flight import OMEGA, Flight, ellipse, hover
@@ -101,6 +103,23 @@ def test_a_cut_strikes_the_stop_as_foretold(y: float) -> None:
     assert struck == pytest.approx(foretold, rel=0.12, abs=0.01)
     if y < 0.028:
         assert struck > SOFT  # a cut is no landing
+
+
+@pytest.mark.parametrize('y', [0.021, 0.023, 0.026, 0.0285])
+def test_all_gaps_on_one_plug_end_on_the_lower_stop_softer_than_by_a_cut(y: float) -> None:
+    flight = fly(hover(y), 600)
+    flight.boards.stuck[:4] = True
+    flight.run(600)
+    flight.until_no_current()
+    fault = flight.stage.fault
+    assert fault is not None
+    assert not fault.cut
+    told = re.search(r'strikes the lower stop at about ([\d.]+) m/s', fault.reason)
+    assert told is not None
+    assert flight.rig.state[0] == 0.031
+    cut, stop = impact_of_cut(flight.stage.parameters, y, 0.0)
+    assert stop == 'upper'
+    assert flight.rig.impact < min(1.15 * float(told.group(1)) + 0.03, 0.8 * cut)
 
 
 @pytest.mark.parametrize('pull', [0.92, 1.0, 1.08])

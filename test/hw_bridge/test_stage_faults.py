@@ -250,6 +250,32 @@ def test_without_any_gap_only_what_falls_down_by_itself_is_cut(
     assert ('strikes the lower stop at about' in stage.fault.reason) == (len(lost) == 4)
 
 
+def test_without_any_gap_what_does_not_fly_is_not_pushed() -> None:
+    stage, _ = active()
+    stage.guard.arrays.position[0] = 0.025
+    blamed(stage, 0, 1, 2, 3)
+    stage._sensing_fault(guard.JUMP, 0)
+    assert stage.fault is not None
+    assert stage.fault.cut
+    assert stage.fault.reason.endswith('jumped')
+    assert stage.mode is Mode.DISABLED
+
+
+def test_what_fails_while_it_is_pushed_down_ends_no_current() -> None:
+    """The model, which has it on its stop by now, may be wrong."""
+    stage, _ = active()
+    aloft(stage)
+    blamed(stage, 0, 1, 2, 3)
+    stage._sensing_fault(guard.STUCK, 0)
+    assert stage.mode is Mode.LANDING
+    stage.guard.arrays.position[0] = stage.parameters.machine.gap_max
+    stage.guard.arrays.rate[0] = 0.0
+    stage.guard.arrays.trust[4], stage.guard.arrays.blamed[4] = LOST, 1
+    stage._begin_landing()
+    assert stage.mode is Mode.LANDING
+    assert stage.landing.arrays.unseen
+
+
 def blamed(stage: BridgeStage, *encoders: int, trust: int = LOST) -> None:
     stage.guard.arrays.blamed[:] = 0
     stage.guard.arrays.blamed[list(encoders)] = 1

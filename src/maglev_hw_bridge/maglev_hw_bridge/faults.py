@@ -30,21 +30,23 @@ def range_fault(code: int, index: int, watched: Guard) -> tuple[str, str]:
     return f'{name} is {value * 1e3:.3f} {unit}, outside its soft range', 'check the reference'
 
 
-def encoder_fault(code: int, watched: Guard, parameters: BridgeParameters) -> tuple[str, str, bool]:
+def encoder_fault(
+    code: int, watched: Guard, parameters: BridgeParameters, flying: bool
+) -> tuple[tuple[str, str], bool]:
     """Reason and remedy of encoders that cannot be believed, by the code of ``watch``.
 
     And whether to cut for it: where no gap encoder is left, and a push down is no softer.
     """
     unseen = bool(watched.blind[0])
     y, rate = watched.arrays.position[0], watched.arrays.rate[0]
-    pushed = unseen and push_is_softer(parameters, y, rate)
+    pushed = unseen and flying and push_is_softer(parameters, y, rate)
     reason, remedy = _encoders_in_words(code, watched)
     if pushed:
         speed = impact_of_push(parameters, y, rate)
         reason += (
             f'; pushed down unseen, the platen strikes the lower stop at about {speed:.2f} m/s'
         )
-    return reason, remedy, unseen and not pushed
+    return (reason, remedy), unseen and not pushed
 
 
 def _encoders_in_words(code: int, watched: Guard) -> tuple[str, str]:

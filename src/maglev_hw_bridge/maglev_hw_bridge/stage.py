@@ -351,7 +351,8 @@ class BridgeStage(StageLife):
     def _begin_landing(self) -> None:
         state, blind = self.guard.arrays, self.guard.blind
         fails_in_lift = self._lifting and self.fault is not None and self.fault.kind != 'stop'
-        near_the_stop = self._touches() or (blind[3:].any() and self._falls_softly())
+        softly = blind[3:].any() and self._falls_softly()
+        near_the_stop = not blind[0] and (self._touches() or softly)
         if not self.flying or fails_in_lift or near_the_stop:
             self._disable()
             return
@@ -379,9 +380,9 @@ class BridgeStage(StageLife):
             self._name_too(lands_for, (code, index), *why)
         else:
             blind = self.guard.blind
-            reason, remedy, cut = faults.encoder_fault(code, self.guard, self.parameters)
-            self._raise_fault('encoder', reason, remedy, cut)
-            self._name_too(lands_for, (code, *self.guard.blamed), reason, remedy)
+            why, cut = faults.encoder_fault(code, self.guard, self.parameters, self.flying)
+            self._raise_fault('encoder', *why, cut=cut)
+            self._name_too(lands_for, (code, *self.guard.blamed), *why)
             if self.mode is Mode.LANDING and code != guard.RESIDUAL and blind.any():
                 self._begin_landing()
 
