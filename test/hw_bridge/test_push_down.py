@@ -75,6 +75,13 @@ def test_it_is_held_once_the_model_has_it_down(y: float, speed: float) -> None:
     np.testing.assert_array_equal(landing.direct_current, currents)
 
 
+def test_as_it_has_no_way_it_cannot_leave_it() -> None:
+    landing = pushing(0.020)
+    for _ in range(3):
+        landing.step(at(0.028), at(0.3), np.zeros(5))
+        assert not landing.astray
+
+
 @pytest.mark.parametrize(('y', 'over'), [(0.0305, 0.15), (0.025, 0.5)])
 def test_it_is_over_when_it_was_held_or_after_half_a_second(y: float, over: float) -> None:
     landing = pushing()
