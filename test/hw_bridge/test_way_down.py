@@ -41,6 +41,23 @@ def times(blind: np.ndarray) -> tuple[float, float]:
     return LAW.braking_time, LAW.descent_time
 
 
+def way_at(
+    time: float, begun: np.ndarray, brake: np.ndarray, level: np.ndarray, blind: np.ndarray
+) -> np.ndarray:
+    """Position, velocity, acceleration (3, 5) of the way down; ``begun``: where and how fast."""
+    start, rate = begun
+    braking, descent = times(blind)
+    way = np.array(
+        [quintic_to_zero(start[i] - level[i], rate[i], 0.0, brake[i], time) for i in range(5)]
+    ).T
+    way[0] += level
+    if time >= braking:
+        aim = GAP_MAX + LAW.depth
+        way[:, 0] = quintic_to_zero(level[0] - aim, 0.0, 0.0, descent, time - braking)
+        way[0, 0] += aim
+    return way
+
+
 @settings(max_examples=100)
 @given(
     off=five,
@@ -78,22 +95,15 @@ def test_it_follows_a_smooth_way_by_position_and_rate(
     number = max(1, round(share * (braking + descent) / T))
     landing.arrays.elapsed = (number - 1) * T
     time = landing.arrays.elapsed + T
-    way = np.array(
-        [quintic_to_zero(start[i] - level[i], moving[i], 0.0, brake[i], time) for i in range(5)]
-    )
-    way[:, 0] += level
-    aim = GAP_MAX + LAW.depth
-    if time >= braking:
-        way[0] = quintic_to_zero(level[0] - aim, 0.0, 0.0, descent, time - braking)
-        way[0, 0] += aim
-    position = way[:, 0] + [2e-4, 3e-5, 3e-5, 2e-4, 3e-4] * later_off
-    speed = way[:, 1] + [0.01, 2e-3, 2e-3, 1e-3, 1e-3] * later_rate
+    way, velocity, acceleration = way_at(time, np.array([start, moving]), brake, level, blind)
+    position = way + [2e-4, 3e-5, 3e-5, 2e-4, 3e-4] * later_off
+    speed = velocity + [0.01, 2e-3, 2e-3, 1e-3, 1e-3] * later_rate
     done = landing.step(position, speed, push)
-    error, slip = way[:, 0] - position, way[:, 1] - speed
-    wanted = way[:, 2] + np.array(LAW.damping) * slip + np.array(LAW.stiffness) * error
+    error, slip = way - position, velocity - speed
+    wanted = acceleration + np.array(LAW.damping) * slip + np.array(LAW.stiffness) * error
     wanted -= np.where([True, False, False, True, True], push, 0.0)
     for axis in (X, Z):
-        if abs(error[axis]) < 2e-5 and abs(way[axis, 1]) + abs(speed[axis]) < 2e-3:
+        if abs(error[axis]) < 2e-5 and abs(velocity[axis]) + abs(speed[axis]) < 2e-3:
             wanted[axis] = 0.0
     place = position.copy()
     if blind[Y]:

@@ -46,8 +46,8 @@ _TILT = 0.95  # share of the attraction that tilts may take there
 _BRAKING_UPWARD = 0.1  # of y [s]
 _PUSH = 4.0  # downwards, of a platen whose gap nothing shows [m/s²]
 _SURELY_DOWN = 1e-3  # so near the lower stop the model must have it by then [m]
-_HOLD, _HELD = 2.0, 0.15  # it is held there, if at the balance at least so hard [m/s²], [s]
-_LONGEST_PUSH = 0.5  # [s]
+_HOLD = 2.0  # what holds it there then would give it at the balance, downwards [m/s²]
+_HOLDING, _LONGEST_PUSH = 0.15, 0.5  # [s]
 _SEATED = 5e-5  # so near the lower stop a cut is soft [m]
 _FREE_STEP = 1e-4  # of the motion without current [s]
 _LONGEST_FALL = 10.0  # [s]
@@ -109,7 +109,7 @@ def land(block: Block, position: FloatArray, rate: FloatArray, disturbance: Floa
         Answer(landing.direct[:], landing.quadrature[:], np.empty(5), np.empty(2)),
     )
     if landing.unseen:
-        return bool(landing.held > _HELD or landing.elapsed > _LONGEST_PUSH)
+        return bool(landing.held > _HOLDING or landing.elapsed > _LONGEST_PUSH)
     longest = landing.descent_start + landing.descent_time + landing.settle_time
     return landing.elapsed > longest or position[0] > landing.end
 
@@ -123,7 +123,7 @@ def _follow(
     thrown_up: bool,
     wanted: FloatArray,
 ) -> None:
-    """The accelerations, ``wanted`` (5,), that keep the platen on its way, and whether it is there.
+    """The accelerations, ``wanted`` (5,), that keep the platen on its way; whether it has left it.
 
     Along x and z what stands still is not pushed, and no friction made up for, which would grow
     with the push: should the encoder be stuck, the platen would at last slide off unseen.
@@ -169,8 +169,9 @@ def _push(
     place: FloatArray,
     wanted: FloatArray,
 ) -> None:
-    """Push down, in place of a way down, what only the model tells of; ``place`` (5,) as well.
+    """Push down, in place of a way down, a platen that only the model tells of.
 
+    Changes y of ``wanted`` (5,) and of ``place`` (5,), where the inverse is to be taken.
     What the model is off by doubles in some 20 ms, so nobody knows when the platen arrives, and
     what brakes it then lifts one that has arrived already. Once the model has it down it is held by
     currents that push it down even from where the magnets just carry it.

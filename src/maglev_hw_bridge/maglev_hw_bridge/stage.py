@@ -351,9 +351,8 @@ class BridgeStage(StageLife):
     def _begin_landing(self) -> None:
         state, blind = self.guard.arrays, self.guard.blind
         fails_in_lift = self._lifting and self.fault is not None and self.fault.kind != 'stop'
-        softly = blind[3:].any() and self._falls_softly()
-        near_the_stop = not blind[0] and (self._touches() or softly)
-        if not self.flying or fails_in_lift or near_the_stop:
+        near = not blind[0] and (self._touches() or (blind[3:].any() and self._falls_softly()))
+        if not self.flying or fails_in_lift or near:
             self._disable()
             return
         self.mode, self._landing_samples = Mode.LANDING, 0
