@@ -217,7 +217,7 @@ def test_counters_that_came_back_as_0_are_not_homed() -> None:
     boards.failing = False
     stage.encoders.arrays.total[:] = 7  # it counted before
     boards.counters[:] = 0
-    boards.rig._start -= boards.rig.counts()
+    boards.rig.arrays.start[:] -= boards.rig.counts()
     cleared, why = stage.reset()
     assert not cleared
     assert 'home first' in why

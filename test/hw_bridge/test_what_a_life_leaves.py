@@ -291,7 +291,7 @@ def test_a_board_whose_counters_began_anew_has_lost_its_home(
     stage, boards = active(**given, **wiring, emulation__wiring__encoder_start=[100] * 6)
     its = np.isin(plugs['board'], back)
     lose(stage, boards)
-    boards.rig._start[its] -= boards.rig.counts()[its]
+    boards.rig.arrays.start[its] -= boards.rig.counts()[its]
     boards.rig.place(np.array([0.031, pushed, pushed, 0.0, 0.0]))
     boards.tick()
     stage.deactivate()

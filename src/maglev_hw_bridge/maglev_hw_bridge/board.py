@@ -45,23 +45,26 @@ ENDING = (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTERM, signal.S
 _LIBC = ctypes.PyDLL(None)
 _Mask = ctypes.c_ubyte * 128  # a sigset_t, as large as any
 _BLOCKED = _Mask()
+_SIG_BLOCK, _SIG_SETMASK = int(signal.SIG_BLOCK), int(signal.SIG_SETMASK)
 for _one in _SIGNALS:
     _LIBC.sigaddset(_BLOCKED, int(_one))
 
 
-@contextlib.contextmanager
-def undisturbed() -> Iterator[None]:
-    """Signals go to other threads, or wait: they interrupt no call here.
+class Undisturbed:
+    """Signals go to other threads, or wait: they interrupt no call inside ``with`` one of these.
 
     Where another thread takes one, what Python does about it is done in the main thread all the
     same, also in here: :func:`unbroken` is what no exception of a signal breaks.
     """
-    before = _Mask()
-    _LIBC.pthread_sigmask(int(signal.SIG_BLOCK), _BLOCKED, before)
-    try:
-        yield
-    finally:
-        _LIBC.pthread_sigmask(int(signal.SIG_SETMASK), before, None)
+
+    def __init__(self) -> None:
+        self._before = _Mask()
+
+    def __enter__(self) -> None:
+        _LIBC.pthread_sigmask(_SIG_BLOCK, _BLOCKED, self._before)
+
+    def __exit__(self, *_: object) -> None:
+        _LIBC.pthread_sigmask(_SIG_SETMASK, self._before, None)
 
 
 @contextlib.contextmanager

@@ -187,7 +187,7 @@ class BridgeStage(StageLife):
 
     def _follow(self, i_d: FloatArray, i_q: FloatArray) -> str:
         """Drive the amplifiers as commanded, unless that is a fault; why a command was refused."""
-        flows = bool(np.any(i_d) or np.any(i_q))
+        flows = any(i_d.tolist()) or any(i_q.tolist())
         if (flows or self.flying) and self._age >= self._stale_samples:
             self._raise_fault('stale', *faults.stale_fault(self._age * self.sample_time))
             return ''

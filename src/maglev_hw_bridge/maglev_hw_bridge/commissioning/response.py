@@ -40,11 +40,13 @@ class Pulses:
         encoders: Encoders,
         amplifiers: Amplifiers,
         peak: float,
+        settles: bool = True,
     ) -> None:
-        """``peak``: largest phase current [A]."""
+        """``peak``: largest phase current [A]; ``settles``: the platen comes to rest at the end."""
         self._driver, self._encoders, self._amplifiers = driver, encoders, amplifiers
         self._period = parameters.sample_time
         self._peak = peak
+        self._settles = settles
         self._counts = np.zeros(6, dtype=np.int32)
         self._current = np.zeros(PHASES)
 
@@ -58,7 +60,12 @@ class Pulses:
         self._driver.start()
         try:
             self._sample()
-            return np.array([self._pulse(phase, sign) for sign in (1.0, -1.0)])
+            forth = self._pulse(phase, 1.0)
+            self._settle()
+            back = self._pulse(phase, -1.0)
+            if self._settles:
+                self._settle()
+            return np.array([forth, back])
         finally:
             self._current[:] = 0.0
             self._driver.stop()
@@ -76,20 +83,19 @@ class Pulses:
         for n in range(1, steps + 1):
             self._current[phase] = sign * self._peak * n / steps
             moved = self._sample() - start
-            gap, horizontal = np.max(np.abs(moved[:4])), np.max(np.abs(moved[4:]))
-            if gap > _GAP_ENOUGH or horizontal > _HORIZONTAL_ENOUGH:
+            far = np.abs(moved).tolist()
+            if max(far[:4]) > _GAP_ENOUGH or max(far[4:]) > _HORIZONTAL_ENOUGH:
                 break
         self._current[:] = 0.0
-        self._settle()
         return moved
 
     def _settle(self) -> None:
         """Wait without current until no encoder counts any more."""
-        last, quiet = self._sample().copy(), 0.0
+        last, quiet = self._sample().tolist(), 0.0
         for _ in range(round(_LONGEST_WAIT / self._period)):
-            now = self._sample()
-            quiet = quiet + self._period if np.array_equal(now, last) else 0.0
-            last[:] = now
+            now = self._sample().tolist()
+            quiet = quiet + self._period if now == last else 0.0
+            last = now
             if quiet >= _QUIET:
                 return
 
@@ -161,7 +167,7 @@ class _Twin:
         self._rig = Rig(twin)
         self._rest = parameters.machine.gap_max
         driver = _RigDriver(self._rig)
-        self._pulses = Pulses(twin, driver, Encoders(twin), Amplifiers(twin), peak)
+        self._pulses = Pulses(twin, driver, Encoders(twin), Amplifiers(twin), peak, False)
 
     def phase(self, phase: int, place: FloatArray) -> FloatArray:
         self._rig.place(np.array([self._rest, place[0], place[1], 0.0, 0.0]))

@@ -16,9 +16,7 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
-import numpy as np
-
-from maglev_hw_bridge.board import Board, attempt, unbroken, undisturbed
+from maglev_hw_bridge.board import Board, Undisturbed, attempt, unbroken
 from maglev_hw_bridge.drivers import CountArray, DriverError, VoltArray, WatchdogError
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_model.parameters import ParameterError
@@ -77,6 +75,7 @@ class QuanserDriver:
         self._first_tick = 0.0
         self.late = 0.0
         self.stop_pressed = False
+        self._undisturbed = Undisturbed()
 
     def open(self) -> None:
         """Open both boards, no current; see the protocol."""
@@ -120,12 +119,15 @@ class QuanserDriver:
     def read(self, counts: CountArray) -> None:
         """The next tick's counts; see the protocol."""
         first, second = self._boards
-        with self._errors('reading a sample'):
-            if first.ask('task_read_encoder', self._task, 1, first.counts) != 1:
-                raise DriverError("the first board's sample clock has stopped")
-            counts[first.encoders] = first.counts
-            second.read_now(counts)
-            self.stop_pressed = first.stop_pressed()
+        try:
+            with self._undisturbed:
+                if first.ask('task_read_encoder', self._task, 1, first.counts) != 1:
+                    raise DriverError("the first board's sample clock has stopped")
+                counts[first.encoders] = first.counts
+                second.read_now(counts)
+                self.stop_pressed = first.stop_pressed()
+        except Exception as error:
+            raise self._explain('reading a sample', error) from error
         self._keep_time()
 
     def _keep_time(self) -> None:
@@ -142,8 +144,8 @@ class QuanserDriver:
     def write(self, volts: VoltArray) -> None:
         """Put out the volts and reload both watchdogs; raises WatchdogError when one expired."""
         first, second = self._boards
-        np.take(volts, first.phases, out=first.volts)
-        np.take(volts, second.phases, out=second.volts)
+        volts.take(first.phases, out=first.volts)
+        volts.take(second.phases, out=second.volts)
         try:
             in_time = first.ask('watchdog_reload')
             in_time = second.ask('watchdog_reload') and in_time
@@ -180,7 +182,7 @@ class QuanserDriver:
 
     def close(self) -> None:
         """No current, everything released, whatever state the boards are in."""
-        with unbroken(), undisturbed():
+        with unbroken(), Undisturbed():
             self._make_safe()
             for board in self._boards:
                 if not board.armed:
@@ -218,7 +220,7 @@ class QuanserDriver:
     @contextlib.contextmanager
     def _errors(self, doing: str) -> Iterator[None]:
         """Whatever is raised is explained, as a DriverError; signals interrupt no call."""
-        with undisturbed():
+        with Undisturbed():
             try:
                 yield
             except Exception as error:

@@ -30,6 +30,8 @@ from maglev_plant.effects.winding import carry_currents, set_current_loop
 from maglev_plant.encoder import encode
 from maglev_plant.parameters import AmplifierParameters, PlantParameters
 
+CountArray = NDArray[np.int64]
+
 _TOUCH = 1e-9  # [m]
 _LONGEST_STEP = 1e-4  # of currents and platen [s]; the plant takes no shorter one
 
@@ -48,6 +50,8 @@ class RigArrays(Record):
     driven: bool  # whether converters, latency or spread are among the stage's effects
     gap_count: float  # [m]
     horizontal_count: float  # [m]
+    direction: Annotated[CountArray, 6]  # +1 or -1, of the six counters
+    start: Annotated[CountArray, 6]  # what they count at absolute zero
     upper_stop: float  # [m]
     lower_stop: float  # [m]
     seat_radius: float  # of the stops' seats [m]
@@ -147,14 +151,15 @@ def advance_rig(rig_block: Block, stage_block: Block, volts: FloatArray, steps: 
 
 
 @borrowing
-def count(rig_block: Block, stage_block: Block, out: NDArray[np.int64]) -> None:
-    """Whole counts of the six encoders, ``out`` (6,), from absolute zero."""
+def count(rig_block: Block, stage_block: Block, out: CountArray) -> None:
+    """What the six counters stand at, before roll-over, ``out`` (6,)."""
     rig: RigArrays = rig_block[0]
     stage: StageArrays = stage_block[0]
     encode(stage_block)
     for i in range(6):
         resolution = rig.gap_count if i < 4 else rig.horizontal_count
-        out[i] = math.floor(stage.reading[i] / resolution + 0.5)
+        counts = math.floor(stage.reading[i] / resolution + 0.5)
+        out[i] = rig.start[i] + rig.direction[i] * counts
 
 
 @compiled
@@ -192,11 +197,7 @@ class Rig:
         winding = self.stage.effects.winding
         winding.offset[:] = self.arrays.angle
         set_current_loop(winding, emulation.winding.bandwidth, step)
-        self._total = np.zeros(6, dtype=np.int64)
-        count(self.arrays.block, self.stage.block, self._total)
-        direction = np.array(self.wiring.encoder_direction, dtype=np.int64)
-        self._start = np.array(self.wiring.encoder_start) - direction * self._total
-        self._direction = direction
+        self.arrays.start[:] = np.array(self.wiring.encoder_start) - self.counts()
 
     def _check(self) -> None:
         wiring = self.wiring
@@ -211,10 +212,10 @@ class Rig:
         """One sample with ``volts`` (12,) by phase held."""
         advance_rig(self.arrays.block, self.stage.block, volts, self.steps)
 
-    def counts(self) -> NDArray[np.int64]:
+    def counts(self) -> CountArray:
         """What the six counters stand at, before roll-over, shape (6,)."""
-        count(self.arrays.block, self.stage.block, self._total)
-        counts: NDArray[np.int64] = self._start + self._direction * self._total
+        counts = np.empty(6, np.int64)
+        count(self.arrays.block, self.stage.block, counts)
         return counts
 
     def tell(self, out: FloatArray) -> None:
@@ -284,6 +285,7 @@ def _rig_arrays(parameters: BridgeParameters, step: float) -> RigArrays:
         driven=parameters.effects.drive != DriveParameters(),
         gap_count=emulation.encoder.gap_resolution,
         horizontal_count=emulation.encoder.horizontal_resolution,
+        direction=wiring.encoder_direction,
         upper_stop=machine.gap_min,
         lower_stop=machine.gap_max,
         seat_radius=emulation.stop.seat_radius,

@@ -177,7 +177,7 @@ class World(EmulatedBoards):
     def _count(self) -> None:
         true = self.rig.counts()
         counts = true + self.jumps
-        if self.noise.any():
+        if any(self.noise.tolist()):
             counts = counts + self.rng.integers(-self.noise, self.noise + 1)
         np.copyto(counts, self._held, where=self.stuck)
         self._held = counts
