@@ -1,4 +1,4 @@
-"""The bridge keeps its promises: runs that once broke one, and one of every third cell."""
+"""The bridge keeps its promises: runs that once broke one, and one of every fifth cell."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def failures(runs: Sequence[Scenario]) -> dict[int, str]:
 
 
 def test_cells_of_fault_and_phase_and_what_was_mended_keep_the_rules() -> None:
-    step = 1 if 'MAGLEV_ALL_CELLS' in os.environ else 3  # all take a minute more on two cores
+    step = 1 if 'MAGLEV_ALL_CELLS' in os.environ else 5  # all take minutes more on two cores
     runs = {run.seed: run for run in [*map(scenario, range(0, len(cells()), step)), *FOUND]}
     runs |= {seed: scenario(seed) for seed in OPEN}
     assert failures(list(runs.values())) == {}
