@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from maglev_hw_bridge import amplifiers
 from maglev_hw_bridge.amplifiers import Amplifiers
-from maglev_hw_bridge.landing import impact_of_push, impacts_of_cut, push_is_softer
+from maglev_hw_bridge.landing import impact_of_push, impacts_of_cut
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.sensing import guard
 from maglev_hw_bridge.sensing.guard import Guard
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES, PHASE_NAMES
-from maglev_model.axes import AXES
+from maglev_model.axes import AXES, FloatArray
 from maglev_model.contract.stage import Fault
-
-FloatArray = NDArray[np.float64]
 
 _RIGID = 5e-5  # what the gaps of a sound platen contradict each other by at most [m]
 
@@ -30,26 +27,8 @@ def range_fault(code: int, index: int, watched: Guard) -> tuple[str, str]:
     return f'{name} is {value * 1e3:.3f} {unit}, outside its soft range', 'check the reference'
 
 
-def encoder_fault(
-    code: int, watched: Guard, parameters: BridgeParameters, flying: bool
-) -> tuple[tuple[str, str], bool]:
-    """Reason and remedy of encoders that cannot be believed, by the code of ``watch``.
-
-    And whether to cut for it: where no gap encoder is left, and a push down is no softer.
-    """
-    unseen = bool(watched.blind[0])
-    y, rate = watched.arrays.position[0], watched.arrays.rate[0]
-    pushed = unseen and flying and push_is_softer(parameters, y, rate)
-    reason, remedy = _encoders_in_words(code, watched)
-    if pushed:
-        speed = impact_of_push(parameters, y, rate)
-        reason += (
-            f'; pushed down unseen, the platen strikes the lower stop at about {speed:.2f} m/s'
-        )
-    return (reason, remedy), unseen and not pushed
-
-
-def _encoders_in_words(code: int, watched: Guard) -> tuple[str, str]:
+def encoder_fault(code: int, watched: Guard) -> tuple[str, str]:
+    """Reason and remedy of encoders that cannot be believed, by the code of ``watch``."""
     if code == guard.RESIDUAL:
         reason = f'the gaps contradict each other by {watched.residual * 1e6:.0f} um'
         return reason, 'check the gap encoders, home again'
@@ -111,6 +90,12 @@ def consequence_of_cut(parameters: BridgeParameters, watched: Guard) -> str:
     hardest = sorted(impacts.items(), key=lambda one: -one[1])
     parts = [f'the {stop} stop at about {speed:.2f} m/s' for stop, speed in hardest]
     return f'; the platen strikes {" or ".join(parts)}'
+
+
+def consequence_of_push(parameters: BridgeParameters, watched: Guard) -> str:
+    """What to add to the reason of a fault for which a platen that nobody sees is pushed down."""
+    speed = impact_of_push(parameters, watched.arrays.position[0], watched.arrays.rate[0])
+    return f'; pushed down unseen, the platen strikes the lower stop at about {speed:.2f} m/s'
 
 
 def astray_fault(watched: Guard) -> tuple[str, str]:

@@ -24,10 +24,9 @@ from maglev_hw_bridge.mode import Mode
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.sensing.guard import Guard
 from maglev_hw_bridge.signal_parameters import ENCODER_NAMES
+from maglev_model.axes import FloatArray
 from maglev_model.contract.stage import STOPPED_SINCE, EncoderSample, Fault, StageError
 from maglev_model.parameters.plugins import describe_error
-
-FloatArray = NDArray[np.float64]
 
 _NEAR_ZERO = 2e-3  # counters that start anew are so near 0, though the platen was pushed [m]
 _BEFORE = np.array([[-(2**31)], [2**31 - 1]], np.int32)  # no encoder counts both, one after another

@@ -11,21 +11,18 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from maglev_hw_bridge import amplifiers, faults
 from maglev_hw_bridge.drivers import Driver, DriverError, Truthful
-from maglev_hw_bridge.landing import Landing, impacts_of_cut
+from maglev_hw_bridge.landing import Landing, impacts_of_cut, push_is_softer
 from maglev_hw_bridge.life_cycle import StageLife
 from maglev_hw_bridge.mode import Mode as Mode
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.sensing import guard
 from maglev_hw_bridge.sensing.gap_knock import GapKnock
 from maglev_hw_bridge.sensing.knock import Knock
-from maglev_model.axes import AXES
+from maglev_model.axes import AXES, FloatArray
 from maglev_model.contract.stage import EncoderSample, Fault, StageError, Truth, motor_currents
-
-FloatArray = NDArray[np.float64]
 
 _ON_THE_STOP, _AT_REST = 1.8e-5, 1e-2  # nearer the lower stop and slower it rests [m], [m/s]
 _NEAR, _STILL, _REST_TIME = 2e-4, 2e-5, 0.1  # so it does where it moves no more there [m, m, s]
@@ -379,9 +376,13 @@ class BridgeStage(StageLife):
             self._name_too(lands_for, (code, index), *why)
         else:
             blind = self.guard.blind
-            why, cut = faults.encoder_fault(code, self.guard, self.parameters, self.flying)
-            self._raise_fault('encoder', *why, cut=cut)
-            self._name_too(lands_for, (code, *self.guard.blamed), *why)
+            y, rate = self.guard.arrays.position[0], self.guard.arrays.rate[0]
+            reason, remedy = faults.encoder_fault(code, self.guard)
+            pushed = blind[0] and self.flying and push_is_softer(self.parameters, y, rate)
+            if pushed:
+                reason += faults.consequence_of_push(self.parameters, self.guard)
+            self._raise_fault('encoder', reason, remedy, cut=bool(blind[0]) and not pushed)
+            self._name_too(lands_for, (code, *self.guard.blamed), reason, remedy)
             if self.mode is Mode.LANDING and code != guard.RESIDUAL and blind.any():
                 self._begin_landing()
 
