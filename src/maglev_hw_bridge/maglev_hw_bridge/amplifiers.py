@@ -16,6 +16,7 @@ from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_model.axes import FloatArray
 from maglev_model.commutation import phase_currents
 from maglev_model.compiled import borrowing, compiled
+from maglev_model.compiled.arrays import put
 from maglev_model.compiled.records import Block, Record
 
 # What drive() returns.
@@ -84,7 +85,7 @@ def _put_out(amplifier: AmplifierArrays) -> bool:
 @compiled
 def _drive_phases(block: Block, current: FloatArray) -> None:
     amplifier: AmplifierArrays = block[0]
-    amplifier.wanted[:] = current
+    put(current, amplifier.wanted)
     _put_out(amplifier)
 
 

@@ -169,7 +169,8 @@ def predict(o: ObserverArrays, current: FloatArray) -> None:
             held = math.inf
         _carry(o, axis, push[axis], held, turning)
     _foretell(o)
-    o.step[:] = o.length - before
+    for i in range(6):
+        o.step[i] = o.length[i] - before[i]
 
 
 @borrowing
