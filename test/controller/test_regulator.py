@@ -16,7 +16,7 @@ from maglev_controller.regulator import MeasurementFault
 from maglev_controller.step.sample import answer_sample
 from maglev_model.axes import AXES
 from maglev_model.machine import MachineParameters, machine_constants
-from maglev_model.parameters import build, from_yaml, read_yaml, specs
+from maglev_model.parameters import build, from_yaml, read_yaml, replace, specs
 
 PARAMS = Path(__file__).resolve().parents[2] / 'params'
 UNIT_Y = np.eye(5)[0]
@@ -79,6 +79,26 @@ def test_a_fault_gives_no_current_and_leaves_no_trace(
     for bench in (struck, spared):
         bench.step(gap=0.02501, x=2e-4)
     np.testing.assert_array_equal(struck.currents, spared.currents)
+
+
+def test_a_gap_that_is_none_is_refused() -> None:
+    """Stops that are far apart, or a wide margin, let outputs pass of which a motor has no gap.
+
+    The forces (1), (2) mean nothing there, and their inverse was not finite, or silently wrong.
+    """
+    tilted = Bench(replace(ControllerParameters(), {'machine.theta_max': 0.05}))
+    beyond = Bench(replace(ControllerParameters(), {'measurement.margin': 0.1}))
+    for bench, gap, number in (
+        (tilted, [0.0185, 0.0, 0.0185, 0.037], 2),
+        (tilted, [0.0185, 0.038, 0.0185, -0.001], 4),
+        (beyond, -0.005, 1),
+        (beyond, -0.02, 1),
+    ):
+        with pytest.raises(MeasurementFault, match=f'gap of motor {number} .* must be above 0'):
+            bench.step(gap=gap)
+        assert not bench.currents.any()
+    tilted.step(gap=[0.0185, 0.001, 0.0185, 0.036])
+    assert np.isfinite(tilted.currents).all()
 
 
 @pytest.mark.parametrize('parameters', [ControllerParameters(), paper()], ids=['default', 'paper'])

@@ -263,15 +263,16 @@ class Regulator:
                 f'the four gaps contradict each other by {warp:.3g} m (at most '
                 f'{self.parameters.measurement.warp:g} m): {values}'
             )
-        return f'the measurement is out of range: {values}: {self._out_of_range()}'
+        return f'the measurement is out of range: {values}: {self._out_of_range(gap)}'
 
-    def _out_of_range(self) -> str:
+    def _out_of_range(self, gap: FloatArray) -> str:
         settings, sample = self.arrays.settings, self.arrays.sample
         outputs = zip(AXES, sample['output'], settings['lower'], settings['upper'], strict=True)
         for name, value, low, high in outputs:
             if not low <= value <= high:
                 return f'{name} is {value:.6g}, the stops leave [{low:.6g}, {high:.6g}]'
-        return 'a value left its range'
+        motor = int(np.argmin(gap))
+        return f'the gap of motor {motor + 1} is {gap[motor]:.6g} m, it must be above 0'
 
 
 def _control_arrays(

@@ -61,8 +61,10 @@ BAD_REFERENCE: Final = 7
 
 
 @borrowing
-def _check(settings: Record, output: FloatArray, warp: float, reference: Reference) -> int:
-    """Whether outputs and reference can be used: a fault code, or 0."""
+def _check(
+    settings: Record, gap: FloatArray, output: FloatArray, warp: float, reference: Reference
+) -> int:
+    """Whether gaps, outputs and reference can be used: a fault code, or 0."""
     size = 0.0
     for index in range(5):
         size += (
@@ -76,6 +78,9 @@ def _check(settings: Record, output: FloatArray, warp: float, reference: Referen
         return WARPED
     for index in range(5):
         if not settings.lower[index] <= output[index] <= settings.upper[index]:
+            return OUT_OF_RANGE
+    for motor in range(4):
+        if not gap[motor] > 0.0:  # where (1)-(4) mean nothing
             return OUT_OF_RANGE
     if not size < LARGEST_REFERENCE:
         return BAD_REFERENCE
@@ -244,7 +249,7 @@ def _measure(
         output[0] += settings.half_gap
         output[1] += settings.half_horizontal
         output[2] += settings.half_horizontal
-    return _check(settings, output, warp, reference)
+    return _check(settings, reading.gap, output, warp, reference)
 
 
 @borrowing
