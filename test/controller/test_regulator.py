@@ -101,6 +101,20 @@ def test_a_gap_that_is_none_is_refused() -> None:
     assert np.isfinite(tilted.currents).all()
 
 
+def test_the_rate_of_an_axis_without_control_is_its_own() -> None:
+    """A tilt that nobody controls and that stands is seen where it is, standing still.
+
+    Its observer is not told of a w that no current makes.
+    """
+    left = {'phi.controlled': False, 'theta.controlled': False}
+    bench = Bench(replace(ControllerParameters(), left))
+    for _ in range(500):
+        bench.step(gap=[0.0246, 0.025, 0.0254, 0.025])
+    axis, phi = bench.regulator.arrays.axes[AXES.index('phi')], 0.0004 / 0.397
+    assert bench.regulator.error_rate[AXES.index('phi')] == pytest.approx(0.0, abs=1e-9)
+    assert axis['estimated_position'] == pytest.approx(phi, rel=1e-3)
+
+
 @pytest.mark.parametrize('parameters', [ControllerParameters(), paper()], ids=['default', 'paper'])
 def test_reset_forgets_everything(parameters: ControllerParameters) -> None:
     """After a reset the same samples give the same currents, bit by bit."""

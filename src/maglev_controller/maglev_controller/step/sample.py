@@ -272,7 +272,10 @@ def _virtual_inputs(settings: Record, sample: Record, axes: Record, reference: R
 def currents_of_w(
     settings: Record, machine: Machine, sample: Record, axes: Record, currents: Currents
 ) -> int:
-    """Currents for the sample's w, and what they realise of it; what limited them."""
+    """Currents for the sample's w, and what they realise of it; what limited them.
+
+    Of an axis without control that is nothing: guides hold it, or it is left to its spring.
+    """
     direct, quadrature = currents.direct, currents.quadrature
     limited_by = _currents(settings, machine, sample, direct, quadrature)
     if limited_by == 0:
@@ -280,6 +283,9 @@ def currents_of_w(
             sample.realised[index] = sample.virtual_input[index]
     if keep_within_voltage(settings, machine, sample, axes, direct, quadrature):
         limited_by |= CURRENT
+    for index in range(5):
+        if settings.controlled[index] == 0.0:
+            sample.realised[index] = 0.0
     return limited_by
 
 
