@@ -154,6 +154,21 @@ def test_a_jump_of_the_set_point_has_no_rate(name: str) -> None:
     assert bench.regulator.error[0] == pytest.approx(-0.003)
 
 
+def test_a_jump_during_another_keeps_the_acceleration() -> None:
+    """A set-point that jumps to and fro while the way to it is still being made good."""
+    bench = Bench()
+    largest = ControllerParameters().jumps.acceleration[1]
+    way = 0.03 * np.eye(5)[1]
+    found = []
+    for k in range(1200):
+        axis = bench.regulator.arrays.axes[1]
+        bench.step(x=float(axis['smooth_position']), position=HOVER + way)
+        if k % 120 == 0:
+            way = -way
+        found.append(abs(axis['wanted_acceleration']))
+    assert 0.9 * largest < max(found) <= largest * (1.0 + 1e-9)
+
+
 @pytest.mark.parametrize('period', [2.5e-4, 1e-3, 3e-3])
 def test_a_reference_without_velocities_may_move_at_0_2_m_s(period: float) -> None:
     for speed, jumps in ((0.19, False), (0.21, period >= 1e-3)):

@@ -17,6 +17,7 @@ from maglev_model.quintic import (
     minimum_jerk_time,
     quintic_coefficients,
     quintic_to_zero,
+    time_to_zero,
     transition_time,
 )
 
@@ -110,3 +111,26 @@ def test_what_rests_at_either_stop_or_beyond_it_takes_its_time(position: float) 
     still = np.zeros(1)
     times = braking_times(np.array([position]), still, np.zeros(1), np.ones(1), 0.4)
     assert times.tolist() == [0.4]
+
+
+@given(st.floats(-0.06, 0.06), st.floats(-0.6, 0.6), st.floats(-6.0, 6.0), st.floats(1.0, 20.0))
+def test_what_moves_already_comes_to_rest_within_the_acceleration(
+    position: float, velocity: float, acceleration: float, most: float
+) -> None:
+    """It takes no longer than it must: 5 % less would be too much of it, or less than the least."""
+    duration = time_to_zero(position, velocity, acceleration, most, 0.2)
+
+    def largest(duration: float) -> float:
+        times = np.linspace(0.0, duration, 501, endpoint=False)
+        way = [quintic_to_zero(position, velocity, acceleration, duration, t) for t in times]
+        return float(np.abs(np.array(way)[:, 2]).max())
+
+    bound = max(most, abs(acceleration))
+    assert largest(duration) <= bound * (1.0 + 1e-9)
+    rest = transition_time(position, most, 0.2)
+    assert duration == rest or largest(duration / 1.05) > bound * (1.0 - 1e-3)
+
+
+def test_from_rest_it_takes_the_time_of_a_transition() -> None:
+    for way in (0.0, 0.001, -0.06):
+        assert time_to_zero(way, 0.0, 0.0, 4.0, 0.2) == transition_time(way, 4.0, 0.2)

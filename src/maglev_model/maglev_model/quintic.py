@@ -16,6 +16,9 @@ PEAK_VELOCITY = 15.0 / 8.0
 PEAK_ACCELERATION = 10.0 / math.sqrt(3.0)
 """Its peak acceleration, in distance / duration²."""
 
+_LONGER = 1.05  # from one tried duration to the next
+_TRIALS = 100
+
 
 def _highest_coefficients(distance: Any, v_0: Any, v_1: Any, a_0: Any, a_1: Any) -> Any:
     """c_3, c_4, c_5 of the quintic over s = t / T; velocities times T, accelerations times T²."""
@@ -105,6 +108,43 @@ def minimum_jerk(share: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]
 def transition_time(distance: float, acceleration: float, least: float) -> float:
     """Duration [s] of a minimum-jerk transition within ``acceleration``, at least ``least``."""
     return max(least, math.sqrt(PEAK_ACCELERATION * abs(distance) / acceleration))
+
+
+@borrowing
+def _largest_acceleration(
+    position: float, velocity: float, acceleration: float, duration: float
+) -> float:
+    """The largest acceleration of :func:`quintic_to_zero`, its beginning included."""
+    slope, bend = velocity * duration, acceleration * duration * duration
+    c_3, c_4, c_5 = _compiled_coefficients(-position, slope, 0.0, bend, 0.0)
+    largest, square = abs(bend), 4.0 * c_4 * c_4 - 10.0 * c_3 * c_5
+    if square >= 0.0:  # where 6 c_3 + 24 c_4 s + 60 c_5 s² is 0
+        q = -(2.0 * c_4 + math.copysign(math.sqrt(square), c_4))
+        for above, below in ((q, 10.0 * c_5), (c_3, q)):
+            if 0.0 < above * below < below * below:
+                s = above / below
+                value = bend + s * (6.0 * c_3 + s * (12.0 * c_4 + s * 20.0 * c_5))
+                largest = max(largest, abs(value))
+    return largest / (duration * duration)
+
+
+@borrowing
+def time_to_zero(
+    position: float, velocity: float, acceleration: float, most: float, least: float
+) -> float:
+    """Duration [s] of :func:`quintic_to_zero` within an acceleration ``most``, at least ``least``.
+
+    From rest it is :func:`transition_time`, and longer where what moves has to be braked first. An
+    acceleration above ``most`` that it begins with is not exceeded further on.
+    """
+    duration, bound = transition_time(position, most, least), max(most, abs(acceleration))
+    if velocity == 0.0 and acceleration == 0.0:
+        return duration
+    for _ in range(_TRIALS):
+        if _largest_acceleration(position, velocity, acceleration, duration) <= bound:
+            break
+        duration *= _LONGER
+    return duration
 
 
 def minimum_jerk_time(distance: float, velocity: float, acceleration: float) -> float:

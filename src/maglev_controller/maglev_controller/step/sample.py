@@ -39,7 +39,7 @@ from maglev_model.inverse import (
 from maglev_model.machine import Machine
 from maglev_model.machine_array import machine_from_array
 from maglev_model.platen import outputs_from_gaps
-from maglev_model.quintic import quintic_to_zero, transition_time
+from maglev_model.quintic import quintic_to_zero, time_to_zero
 
 JUMP: Final = 2e-4
 """A change of the reference within one sample that its velocity does not explain [m, rad] and that
@@ -110,8 +110,9 @@ def _follow_jump(
         axis.transition_velocity = velocity
         axis.transition_acceleration = acceleration
         axis.transition_elapsed = 0.0
-        axis.transition_duration = transition_time(
-            position, settings.jump_acceleration[index], settings.jump_time
+        most = settings.jump_acceleration[index]
+        axis.transition_duration = time_to_zero(
+            position, velocity, acceleration, most, settings.jump_time
         )
     return position, velocity, acceleration
 
