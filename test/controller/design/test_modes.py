@@ -73,6 +73,27 @@ def test_a_mode_five_per_cent_off_is_borne(frequency: float, gain: float, delay:
     assert f'with a mode at {frequency:g} Hz ± 5 %' in margins.text('y')
 
 
+@pytest.mark.parametrize(('first', 'second', 'speed'), [(60.0, 120.0, 0.5), (100.0, 200.0, 0.99)])
+def test_a_mode_is_borne_beside_one_that_needs_a_notch(
+    first: float, second: float, speed: float
+) -> None:
+    """The second is unstable without its notch, which is not there yet when the first's is chosen.
+
+    Alone the first takes no speed from the axis, and the second a fifth of it, or none.
+    """
+    modes = {
+        'modes.axis': ('x', 'x'),
+        'modes.frequency': (first, second),
+        'modes.damping': (0.01, 0.01),
+        'modes.gain': (0.3, -0.3),
+    }
+    parameters = build(ControllerParameters, modes)
+    chosen = design(parameters, 'x')
+    check_margins(parameters, all_margins(parameters, [chosen] * 5)[1], 'x')
+    whole = design(ControllerParameters(), 'x')
+    assert chosen.gain[0] / whole.gain[0] > speed**2
+
+
 @pytest.mark.parametrize('delay', [0, 1])
 def test_the_step_runs_the_notches_as_designed(delay: int) -> None:
     """The same errors in, the same w out as of the controller system, with two modes of x."""

@@ -11,6 +11,7 @@ is least over all frequencies the mode may have; the axis is made slower until t
 from __future__ import annotations
 
 import dataclasses
+import functools
 import itertools
 import math
 from collections.abc import Callable, Sequence
@@ -117,24 +118,38 @@ class _Grid:
         self._z: ComplexArray = np.exp(1j * omega[within] * period)
 
     def fitted(self, design: AxisDesign) -> AxisDesign | None:
-        """The design with notches for all modes, or None where the peak stays too high."""
-        case = self._case
-        plants = [self._plant(modes, design.stiffness) for modes in self._variants]
-        responses = np.array([response(plant, self._z) for plant in plants])
+        """The design with notches for all modes, or None where the peak stays too high.
+
+        Of several modes each notch is sought beside all of them; and where that fails, as beside
+        one that is unstable without a notch of its own, beside those that have had theirs.
+        """
+        found = self._notched(design, self._variants)
+        if found is None and len(self._case.modes) > 1:
+            found = self._notched(design, None)
+        return found
+
+    def _notched(
+        self, design: AxisDesign, given: Sequence[tuple[Mode, ...]] | None
+    ) -> AxisDesign | None:
+        """``fitted`` for given variants, or those of the modes so far."""
+        case, modes = self._case, sorted(self._case.modes)
         inner = feedback_system(design, case.period, case.delay)
         by_error, by_acting = (
             response(StateSpace(inner.state, drive, inner.output, direct), self._z)
             for drive, direct in ((inner.error_input, inner.direct), (inner.acting_input, 0.0))
         )
 
-        def peak(filtered: ComplexArray) -> float:
+        def peak(filtered: ComplexArray, responses: ComplexArray) -> float:
             controller = filtered * by_error / (1.0 - filtered * by_acting)
             return float(np.max(1.0 / np.abs(1.0 - responses * controller)))
 
         chosen: list[Notch] = []
         series: ComplexArray = np.ones_like(self._z)
-        for mode in sorted(case.modes):
-            ranked = self._ranked(mode, series, peak)
+        for count, mode in enumerate(modes, start=1):
+            beside = variants(modes[:count], case.tolerance) if given is None else given
+            plants = [self._plant(each, design.stiffness) for each in beside]
+            responses = np.array([response(plant, self._z) for plant in plants])
+            ranked = self._ranked(mode, series, functools.partial(peak, responses=responses))
             for candidate in ranked[:6]:
                 notches = (*chosen, *candidate)
                 if self._stable(dataclasses.replace(design, notches=notches), plants):
@@ -144,7 +159,7 @@ class _Grid:
             chosen = list(notches)
             for each in candidate:
                 series = series * notch_response(each, self._z)
-        if peak(series) > case.sensitivity:
+        if peak(series, responses) > case.sensitivity:
             return None
         return dataclasses.replace(design, notches=tuple(chosen))
 
