@@ -251,6 +251,24 @@ def test_what_is_too_ill_conditioned_is_refused() -> None:
         Regulator(chosen)
 
 
+@pytest.mark.parametrize(
+    'speeds', [{'integration': 10.0}, {'learning': 100.0}, {'integration': 5.0, 'learning': 5.0}]
+)
+def test_oscillators_that_learn_as_fast_as_the_integrator_are_told_of(
+    speeds: dict[str, float],
+) -> None:
+    """They are stable as LQR has them, but not turned for friction at rest."""
+    given: dict[str, object] = {f'theta__{name}': speed for name, speed in speeds.items()}
+    with pytest.raises(
+        ParameterError, match=r"theta: .* unstable .*; oscillators .* or 'internal_model\.rest' to"
+    ):
+        Regulator(parameters(**given))
+    Regulator(parameters(**given, internal_model__rest='hold'))
+    fast = {'rate_estimate': 'derivative', 'theta__bandwidth': 1800.0}
+    with pytest.raises(ParameterError, match=r'theta: .* is unstable .* rad/s\)$'):
+        Regulator(parameters(**fast))
+
+
 def test_an_axis_without_control_is_not_judged() -> None:
     """Its gains are not used."""
     wild = {**weights('phi', error=1e13), 'phi__controlled': False}

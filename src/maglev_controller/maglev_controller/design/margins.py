@@ -34,6 +34,10 @@ from maglev_model.parameters import ParameterError
 _GRID = 1500  # frequencies looked at
 _RINGING = 0.8  # |z| of a pole that may ring
 _BESIDE = 1.0 + np.array([-1e-4, -1e-7, 1e-7, 1e-4])  # of a crossover
+_TURNED = (
+    '; oscillators that are turned for friction at rest want an integrator that is faster than they'
+    " learn: set its learning well below its integration, or 'internal_model.rest' to 'hold'"
+)
 _SLOPES = tuple(np.geomspace(1.0, 1e6, 25))  # of friction against velocity [1/s]
 
 
@@ -285,10 +289,11 @@ def check_margins(parameters: ControllerParameters, margins: LoopMargins, axis: 
         )
     if not margins.spectral_radius < 1.0:
         worst = margins.poles[np.argmax(np.abs(margins.poles))]
+        frequency = abs(np.angle(worst)) / margins.period
         raise ParameterError(
             f'{axis}: with these gains and this rate estimate the loop is unstable at a sample '
             f'time of {margins.period:g} s (largest pole |z| = {margins.spectral_radius:.4f} at '
-            f'{abs(np.angle(worst)) / margins.period:.4g} rad/s)'
+            f'{frequency:.4g} rad/s){_what_turns(parameters, margins, axis, frequency)}'
         )
     if parameters.margins.override:
         return
@@ -304,6 +309,16 @@ def check_margins(parameters: ControllerParameters, margins: LoopMargins, axis: 
             'make the axis faster or its integrator slower (its integration or weight_model), or '
             "set 'internal_model.rest' to 'hold'"
         )
+
+
+def _what_turns(
+    parameters: ControllerParameters, margins: LoopMargins, axis: str, frequency: float
+) -> str:
+    """What to add where a loop swings at a ``frequency`` [rad/s] where turned oscillators act."""
+    multiples = getattr(parameters, axis).multiples
+    highest = parameters.internal_model.fundamental * max(multiples, default=0.0)
+    fades = not math.isnan(margins.friction)
+    return _TURNED if fades and frequency < highest else ''
 
 
 def check_in_real_time(parameters: ControllerParameters, designs: Sequence[AxisDesign]) -> None:
