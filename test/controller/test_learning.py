@@ -221,6 +221,20 @@ def test_what_is_learned_is_saved_and_loaded(tmp_path: Path) -> None:
     assert [file.name for file in tmp_path.iterdir()] == ['learned.npz']
 
 
+@pytest.mark.parametrize('bandwidth', [50.0, 250.0, 1570.0])
+def test_what_is_learned_passes_a_low_pass(bandwidth: float) -> None:
+    """Nearly 1 at rest, half at the bandwidth, nothing at half the sample rate; above it nothing.
+
+    Beyond what the samples can hold a windowed sinc is a high-pass, and what is slow is forgotten.
+    """
+    given = {'learning.period': 8.0, 'learning.bandwidth': bandwidth}
+    learning = IterativeLearning(build(ControllerParameters, given))
+    low = learning.arrays.kernels[0]
+    place = np.arange(low.size) - low.size // 2
+    gains = [low @ np.cos(PERIOD * omega * place) for omega in (0.0, bandwidth, np.pi / PERIOD)]
+    np.testing.assert_allclose(gains, [1.0, 0.5, 0.0], atol=0.01)
+
+
 def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
     path = tmp_path / 'learned.npz'
     IterativeLearning(build(ControllerParameters, SHORT)).save(path)
@@ -228,6 +242,7 @@ def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
         ({'learning.period': 0.8}, r"'learning.file'.*\(400, 5\).*\(800, 5\)"),
         ({'learning.period': 4.0 / 3.0}, r"'learning.period' is 1\.33333 s.*4 s"),
         ({'learning.period': 0.1}, "'learning.period' is 0.1 s"),
+        ({'learning.bandwidth': 1600.0}, "'learning.bandwidth' is 1600 rad/s, more than half"),
     ):
         with pytest.raises(ParameterError, match=reason):
             iterative_learning(

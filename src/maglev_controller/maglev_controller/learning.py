@@ -276,6 +276,12 @@ def _check(parameters: ControllerParameters, samples: int, reach: int) -> None:
             f"parameter 'learning.period' is {period:g} s, {period / sample_time:g} samples, it "
             f'must be whole samples; of its multiples {fits}'
         )
+    if parameters.learning.bandwidth * sample_time > 0.5 * math.pi:
+        raise ParameterError(
+            f"parameter 'learning.bandwidth' is {parameters.learning.bandwidth:g} rad/s, more than "
+            f'half of what a sample time of {sample_time:g} s can hold '
+            f'({math.pi / sample_time:g} rad/s)'
+        )
     if samples < 4 * reach:
         raise ParameterError(
             f"parameter 'learning.period' is {period:g} s, at a 'learning.bandwidth' of "
