@@ -11,7 +11,10 @@ from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
 from maglev_controller.supervision import Supervisor
 from maglev_model.contract.phases import Phase
+from maglev_model.inverse import CURRENT, Answer, CurrentLimits, simplified_inverse
+from maglev_model.machine import machine_constants
 from maglev_model.parameters import build, replace
+from maglev_model.platen import output_accelerations
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
 from maglev_study.closed_loop import run
@@ -81,6 +84,32 @@ def test_a_voltage_that_is_given_in_flight_finds_the_currents_that_flow(voltage:
     new.step(*stage.read(), *(column[0] for column in references), *currents)
     assert before.min() > 0.9
     np.testing.assert_allclose(currents[0], before, atol=0.01)
+
+
+def test_what_the_voltage_takes_is_all_that_is_lost() -> None:
+    """Of an inverse that is off by itself: the simplified one at 20 mm by more than 1 m/s².
+
+    What is realised of w falls short by what the shorter currents change, no more.
+    """
+    chosen = build(ControllerParameters, {'inverse': 'simplified', 'winding.voltage': 15.0})
+    regulator, currents = Regulator(chosen), np.empty((2, 4))
+    step = NEAR + np.array([2e-5, 0.0, 0.0, 0.0, 0.0])
+    for output in [NEAR] * 60 + [step]:
+        gap = np.full(4, output[0])
+        limited = regulator.step(gap, 0.0, 0.0, NEAR, *np.zeros((2, 5)), *currents)
+    assert limited == CURRENT
+    machine, whole = machine_constants(chosen.machine), np.empty((2, 4))
+    told = Answer(*whole, np.empty(5), np.empty(2))
+    limits = CurrentLimits(chosen.limits.current, 1.0, chosen.limits.least_attraction)
+    assert not simplified_inverse(
+        machine, limits, np.ones(5), step, regulator.virtual_input.copy(), told
+    )
+    made, wanted = (
+        output_accelerations(machine, step[0], 0.0, 0.0, *each)[0] for each in (currents, whole)
+    )
+    assert abs(wanted - told.realised[0]) > 1.0
+    realised = regulator.arrays.sample['realised'][0]
+    assert realised == pytest.approx(told.realised[0] + made - wanted, abs=1e-9)
 
 
 def test_a_saved_regulator_remembers_the_currents_that_flow() -> None:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maglev_controller.step.arrays import INTERVALS, Record
+from maglev_controller.step.arrays import EXACT, INTERVALS, Record
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import borrowing
 from maglev_model.machine import Machine, machine_constants
@@ -83,20 +83,23 @@ def keep_within_voltage(
 ) -> bool:
     """Shorten the steps of ``direct`` and ``quadrature`` (4,) to what the voltage gives.
 
-    True when one was; ``realised`` of the sample is then what all currents make. ``asked`` of the
-    sample, from which the next step goes, is kept without limits too: they may be set in flight.
+    True when one was; ``realised`` of the sample is then what all currents make, where the inverse
+    is exact. Of another inverse it is what that has told and what the shortening changes of it: by
+    how much its own model is off is no acceleration that was lost. ``asked`` of the sample, from
+    which the next step goes, is kept without limits too: they may be set in flight.
     """
     if not settings.winding.limits:
         for motor in range(4):
             sample.asked[motor], sample.asked[4 + motor] = direct[motor], quadrature[motor]
         return False
     winding, before, shortened = settings.winding, sample.asked, False
-    gap = sample.work[0]  # the inverse is done with it
+    gap, whole_d, whole_q = sample.work[0], sample.work[1], sample.work[2]  # the inverse is done
     gaps_from_outputs(machine, sample.position, gap)
     rate = axes[0].smooth_velocity
     tilt_phi = machine.r * axes[3].smooth_velocity
     tilt_theta = machine.r * axes[4].smooth_velocity
     for motor in range(4):
+        whole_d[motor], whole_q[motor] = direct[motor], quadrature[motor]
         turn = (-tilt_phi, tilt_theta, tilt_phi, -tilt_theta)[motor]
         speed = axes[2].smooth_velocity if motor % 2 == 0 else axes[1].smooth_velocity
         inductance, slope = _inductance(winding, gap[motor])
@@ -114,9 +117,13 @@ def keep_within_voltage(
             direct[motor], quadrature[motor] = i_d + share * step_d, i_q + share * step_q
         before[motor], before[4 + motor] = direct[motor], quadrature[motor]
     if shortened:
-        made = output_accelerations(
-            machine, sample.position[0], sample.position[3], sample.position[4], direct, quadrature
-        )
-        for index in range(5):
-            sample.realised[index] = made[index]
+        y, phi, theta = sample.position[0], sample.position[3], sample.position[4]
+        made = output_accelerations(machine, y, phi, theta, direct, quadrature)
+        if settings.inverse == EXACT:
+            for index in range(5):
+                sample.realised[index] = made[index]
+        else:
+            whole = output_accelerations(machine, y, phi, theta, whole_d, whole_q)
+            for index in range(5):
+                sample.realised[index] += made[index] - whole[index]
     return shortened
