@@ -309,7 +309,7 @@ def test_what_hardly_moves_along_x_or_z_is_not_braked(
 def test_a_platen_that_is_not_held_on_its_way_is_noticed(
     axis: int, share: float, y: float, patience: float
 ) -> None:
-    """Along x and z later where the magnets would pull it up when let go, above 28.7 mm."""
+    """Along x and z later where the magnets would pull it up when let go, at gaps below 28.7 mm."""
     landing = Landing(BridgeParameters())
     place = np.array([y, 0.0, 0.0, 0.0, 0.0])
     landing.begin(place, np.zeros(5))
