@@ -12,6 +12,7 @@ from retuning import retuned
 from maglev_controller.bumpless_transfer import model_maps
 from maglev_controller.parameters import ControllerParameters
 from maglev_controller.regulator import Regulator
+from maglev_model.axes import AXES
 from maglev_model.parameters import ParameterError, build, read_yaml, replace
 from maglev_plant.parameters import PlantParameters
 from maglev_plant.simulation import SimulatedStage
@@ -104,6 +105,17 @@ def fewer_frequencies(period: float) -> np.ndarray:
 @pytest.mark.parametrize('period', [2.5e-4, 1.25e-3, 2e-3])
 def test_internal_models_are_compared_over_two_seconds_at_any_sample_time(period: float) -> None:
     np.testing.assert_allclose(fewer_frequencies(period), fewer_frequencies(PERIOD), atol=0.02)
+
+
+@pytest.mark.parametrize('frequency', [50.0, 100.0, 150.0])
+def test_an_oscillator_of_any_frequency_is_carried_over_whole(frequency: float) -> None:
+    """As at 100 Hz, where moments 5 ms apart show nothing of one of its two states."""
+    chosen = {'internal_model.fundamental': 2.0 * np.pi * frequency, 'y.multiples': (0.0, 1.0)}
+    others = {f'{axis}.multiples': (0.0,) for axis in AXES[1:]}
+    old = build(ControllerParameters, {**chosen, **others, 'margins.override': True})
+    new = replace(old, {'observer.bandwidth': 840.0})
+    found = model_maps(*(Regulator(each).arrays for each in (old, new)))[0]
+    np.testing.assert_allclose(found, np.eye(3), atol=1e-9)
 
 
 def test_the_share_that_fades_is_gone_soon() -> None:

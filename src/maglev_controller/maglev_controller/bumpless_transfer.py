@@ -21,6 +21,9 @@ ModelMaps = tuple[FloatArray, ...]
 
 _HORIZON = 2.0  # over which old and new internal model are compared [s]
 _STRIDE = 0.005  # between the moments at which they are, at least a sample [s]
+_TURN = (
+    0.5 * np.pi
+)  # of the fastest oscillator between them, at most: at π one state would not show
 
 
 def check_retuning(old: ControllerParameters, new: ControllerParameters) -> None:
@@ -111,20 +114,26 @@ def _translate_rate(new: ControlArrays, axis: int) -> None:
 
 
 def _model_map(old: ControlArrays, new: ControlArrays, axis: int) -> FloatArray:
-    outputs = _outputs(new, axis)
+    samples = min(_stride(old, axis), _stride(new, axis))
+    outputs = _outputs(new, axis, samples)
     scale = np.max(np.abs(outputs), axis=0)
     scale[scale == 0.0] = 1.0
-    scaled: FloatArray = np.linalg.pinv(outputs / scale, rcond=1e-10) @ _outputs(old, axis)
+    scaled: FloatArray = np.linalg.pinv(outputs / scale, rcond=1e-10) @ _outputs(old, axis, samples)
     return np.asarray(scaled / scale[:, None])
 
 
-def _outputs(arrays: ControlArrays, axis: int) -> FloatArray:
-    """What each state of an internal model, left to itself, adds to w at the moments compared."""
+def _stride(arrays: ControlArrays, axis: int) -> int:
+    """Samples between the moments at which an internal model is compared."""
+    turn = np.abs(np.angle(np.linalg.eigvals(arrays.transition[axis]))).max()  # in a sample
+    longest = round(_STRIDE / float(arrays.settings['period']))
+    return max(1, min(longest, int(_TURN / turn)) if turn > 0.0 else longest)
+
+
+def _outputs(arrays: ControlArrays, axis: int, samples: int) -> FloatArray:
+    """What each state of an internal model, left to itself, adds to w, every so many samples."""
     transition, output = arrays.transition[axis], arrays.models['output'][axis]
-    period = float(arrays.settings['period'])
-    samples = max(1, round(_STRIDE / period))
     stride = np.linalg.matrix_power(transition, samples)
-    rows = np.empty((round(_HORIZON / (samples * period)), output.size))
+    rows = np.empty((round(_HORIZON / (samples * float(arrays.settings['period']))), output.size))
     for row in rows:
         row[:] = output
         output = output @ stride
