@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import importlib
-import os
 import sys
 from typing import Any
 
+from maglev_model.programs.command import open_streams
 from maglev_node import signals
-
-_STANDARD_ERROR = 2  # its number, the last of the three
 
 
 def run_nodes(
@@ -26,7 +24,7 @@ def run_nodes(
     A signal while the rest is imported, for a third of a second, ends the nodes in order as soon as
     they are there.
     """
-    _open_streams()
+    open_streams()
     asked = {'-h', '--help'} & set(sys.argv[1:])
     caught = [] if asked else signals.listen(suspends)
     process = importlib.import_module('maglev_node.process')
@@ -34,15 +32,3 @@ def run_nodes(
         process.say_help(name, *nodes)
     else:
         process.main(name, caught, *nodes, background=background)
-
-
-def _open_streams() -> None:
-    """Let standard streams that whoever started it has closed lead nowhere.
-
-    The next file or socket would have their number, and the log be written to that.
-    """
-    while (nowhere := os.open(os.devnull, os.O_RDWR)) <= _STANDARD_ERROR:
-        pass
-    os.close(nowhere)
-    sys.stdout = sys.stdout or os.fdopen(1, 'w')
-    sys.stderr = sys.stderr or os.fdopen(_STANDARD_ERROR, 'w')

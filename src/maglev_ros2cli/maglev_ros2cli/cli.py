@@ -13,7 +13,7 @@ from typing import NoReturn
 
 import argcomplete
 
-from maglev_model.programs.command import unwritten
+from maglev_model.programs.command import open_streams, unwritten
 from maglev_ros2cli.parser import SUBSET, CommandError, Parser
 
 COMMANDS = {
@@ -60,8 +60,7 @@ def run(words: Sequence[str]) -> int:
     try:
         arguments = parser(words).parse_args(words)
         code = arguments.run(arguments)
-        if sys.stdout is not None:  # closed by whoever started it
-            sys.stdout.flush()
+        sys.stdout.flush()
     except CommandError as error:
         print(error, file=sys.stderr)
         return 1
@@ -91,8 +90,8 @@ def main() -> NoReturn:
         sys.exit(_TERMINATED)
 
     signal.signal(signal.SIGTERM, terminate)
-    if sys.stdout is not None:
-        sys.stdout.reconfigure(line_buffering=True)  # type: ignore[union-attr]
+    open_streams()
+    sys.stdout.reconfigure(line_buffering=True)  # type: ignore[union-attr]
     try:
         code: object = run(sys.argv[1:])
     except SystemExit as error:
@@ -102,7 +101,7 @@ def main() -> NoReturn:
         if not told_to_end:
             sys.excepthook(*sys.exc_info())
             code = 70
-    for stream in filter(None, (sys.stdout, sys.stderr)):
+    for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(OSError):
             stream.flush()
     os._exit(code if isinstance(code, int) else 0)

@@ -62,8 +62,16 @@ def test_a_full_disk_is_told_in_a_line(body: str) -> None:
     assert errors == 'error: cannot write to the standard output: No space left on device\n'
 
 
-def test_without_anywhere_to_print_it_ends_as_ever() -> None:
-    assert run('pass', '>&-') == (3, '', '')
+@pytest.mark.parametrize(
+    'body', ['pass', 'sys.stdout.write("a bar" * sys.stdout.isatty())', 'open("/dev/null")']
+)
+@pytest.mark.parametrize('shell', ['>&-', '<&- >&- 2>&-'])
+def test_without_anywhere_to_print_it_ends_as_ever(body: str, shell: str) -> None:
+    assert run(body, shell) == (3, '', '')
+
+
+def test_what_is_wrong_is_not_taken_for_output_where_no_errors_are_wanted() -> None:
+    assert run('print("it is wrong", file=sys.stderr)', '2>&- | cat') == (3, 'a line\n', '')
 
 
 def test_a_defect_shows() -> None:

@@ -10,6 +10,8 @@ import sys
 from collections.abc import Callable, Iterator
 from typing import NoReturn
 
+_STANDARD_ERROR = 2  # its number, the last of the three
+
 
 def leave_with(command: Callable[[], int]) -> NoReturn:
     """Run a command and leave the process with its exit code.
@@ -19,13 +21,13 @@ def leave_with(command: Callable[[], int]) -> NoReturn:
     What cannot be written, as to a disk that is full, is told in a line, with 1. A Ctrl-C that
     whoever started it holds back while modules are imported, by blocking SIGINT, is heeded here.
     """
+    open_streams()
     try:
         try:
             signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
             code = command()
         finally:
-            if sys.stdout is not None:  # closed by whoever started it
-                sys.stdout.flush()
+            sys.stdout.flush()
     except BrokenPipeError:
         write_no_more()
         code = 128 + signal.SIGPIPE
@@ -38,6 +40,18 @@ def leave_with(command: Callable[[], int]) -> NoReturn:
         print(said, file=sys.stderr)
         code = 1
     sys.exit(code)
+
+
+def open_streams() -> None:
+    """Let standard streams that whoever started the program has closed lead nowhere.
+
+    The next file or socket would have their number, and what is printed be written to that.
+    """
+    while (nowhere := os.open(os.devnull, os.O_RDWR)) <= _STANDARD_ERROR:
+        pass
+    sys.stdout = sys.stdout or os.fdopen(os.dup(nowhere), 'w')
+    sys.stderr = sys.stderr or os.fdopen(os.dup(nowhere), 'w')
+    os.close(nowhere)
 
 
 def unwritten(error: OSError) -> str:
