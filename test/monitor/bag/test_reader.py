@@ -65,6 +65,24 @@ def test_a_damaged_chunk_ends_the_reading(
     assert 'a chunk is damaged' in notes[0]
 
 
+@pytest.mark.parametrize('compress', [False, True])
+def test_a_byte_that_is_another_one_is_not_taken_for_a_measurement(
+    tmp_path: Path, run: Any, messages: dict[str, list[bytes]], compress: bool
+) -> None:
+    writer = open_bag(tmp_path / 'bag', compress=compress)
+    write_samples(writer, run, messages)
+    writer.close()
+    file = tmp_path / 'bag' / 'bag_0.mcap'
+    with file.open('rb') as opened:
+        summary = make_reader(opened).get_summary()
+    assert summary is not None
+    chunk = summary.chunk_indexes[-1]
+    content = bytearray(file.read_bytes())
+    content[chunk.chunk_start_offset + chunk.chunk_length - chunk.compressed_size // 2] ^= 1
+    file.write_bytes(content)
+    assert 'a chunk is damaged' in read(tmp_path / 'bag')[1][0]
+
+
 def test_runs_one_after_the_other_are_not_taken_for_one(
     tmp_path: Path, run: Any, messages: dict[str, list[bytes]]
 ) -> None:

@@ -169,7 +169,6 @@ class BagWriter:
             cast(IO[bytes], self._file),
             chunk_size=_CHUNK_BYTES,
             compression=self._compression,
-            enable_crcs=False,  # a tenth of what a message costs
         )
         self._mcap.start('ros2')
         self._files[name] = self._span = Span()
