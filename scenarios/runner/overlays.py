@@ -41,7 +41,7 @@ def check_overlay(path: str, namespace: str = '', sections: Sequence[str] = SECT
         site.main()
     import yaml
 
-    from maglev_model.parameters import ParameterError, read_yaml
+    from maglev_model.parameters import ParameterError, applies, read_yaml
 
     try:
         read_yaml(path, '')
@@ -50,11 +50,14 @@ def check_overlay(path: str, namespace: str = '', sections: Sequence[str] = SECT
     loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
     content = yaml.compose(Path(path).read_text(encoding='utf-8'), Loader=loader)
     given = [key.value for key, _ in content.value] if content else []
-    names = [name.removeprefix(f'{namespace}/').lstrip('/') for name in given]
-    some = any(name in sections for name in names)
-    for name, written in zip(names, given, strict=True):
-        if name not in sections and not (some and name in (*SECTIONS, DISTRIBUTIONS)):
+
+    def heard(name: str, nodes: Sequence[str]) -> bool:
+        return applies(name, [f'{where}/{node}' for node in nodes for where in ('', namespace)])
+
+    some = any(heard(name, sections) for name in given)
+    for name in given:
+        if not heard(name, sections) and not (some and heard(name, (*SECTIONS, DISTRIBUTIONS))):
             raise WrongUseError(
-                f"--params: '{path}' has parameters for '{written}',"
+                f"--params: '{path}' has parameters for '{name}',"
                 f' which is no node here: {", ".join(sections)}'
             )

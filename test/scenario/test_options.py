@@ -204,6 +204,14 @@ def test_without_a_namespace_none_is_set(tree: Tree) -> None:
     assert '-r' not in tree.arguments('plant')
 
 
+@pytest.mark.parametrize('section', ['/**/plant', '/*/plant', 'a/plant', '/a/*', '/**/a/**'])
+def test_a_section_may_name_nodes_by_wildcards_as_in_ros(tree: Tree, section: str) -> None:
+    path = str(tree.parameters('mine.yaml', section))
+    overlays.check_overlay(path, '/a')
+    with pytest.raises(options.WrongUseError, match='which is no node here'):
+        overlays.check_overlay(path, '/b/c' if '**/plant' not in section else '/a', ('reference',))
+
+
 def test_runs_in_namespaces_are_left_apart(tree: Tree) -> None:
     code, output = tree.finish('--namespace', 'lab/b', script='ellipse')
     assert code == 0, output

@@ -1,6 +1,7 @@
 """Typed parameters: one frozen dataclass is the table of a node's parameters. No ROS here."""
 
 from maglev_model.parameters.files import DIFFERS as DIFFERS
+from maglev_model.parameters.files import applies as applies
 from maglev_model.parameters.files import differing as differing
 from maglev_model.parameters.files import from_yaml as from_yaml
 from maglev_model.parameters.files import read_argument as read_argument

@@ -46,7 +46,7 @@ def read_yaml(path: str | Path, *nodes: str) -> dict[str, object]:
             own = _flatten(body['ros__parameters'])
         except ValueError as error:
             raise ParameterError(f"'{path}': in section '{section}' {error}") from error
-        if _applies(name, nodes):
+        if applies(name, nodes):
             found.update(own)
     return found
 
@@ -58,7 +58,7 @@ def read_argument(text: str, *nodes: str) -> dict[str, object]:
     """
     names, _, value = text.partition(':=')
     section, _, name = names.rpartition(':')
-    if section and not _applies(section, nodes):
+    if section and not applies(section, nodes):
         return {}
     try:
         return {name: ros_yaml.load(value)}
@@ -66,8 +66,8 @@ def read_argument(text: str, *nodes: str) -> dict[str, object]:
         raise ParameterError(f"'{value}' of parameter '{name}' is no valid YAML") from error
 
 
-def _applies(section: str, nodes: Iterable[str]) -> bool:
-    """Whether a section of a parameter file is for a node that has these names."""
+def applies(section: str, nodes: Iterable[str]) -> bool:
+    """Whether a section of a parameter file is for a node that has these names, as ROS has it."""
     pattern = re.escape(_absolute(section))
     pattern = pattern.replace(r'/\*\*', '(/[^/]+)*').replace(r'\*', '[^/]+')
     return any(re.fullmatch(pattern, _absolute(node)) for node in nodes)
