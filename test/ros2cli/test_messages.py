@@ -128,10 +128,12 @@ def test_fill_with_the_time_of_publication() -> None:
     ('message', 'values', 'words'),
     [
         (String(), 'dato: hello', "'String' object has no attribute 'dato'"),
-        (Bool(check_fields=True), 'data: yes please', "'data' field must be of type 'bool'"),
-        (UInt8(check_fields=True), 'data: 256', r'unsigned integer in \[0, 255\]'),
+        (Bool(check_fields=False), 'data: yes please', "'data' field must be of type 'bool'"),
+        (UInt8(check_fields=False), 'data: 256', r'unsigned integer in \[0, 255\]'),
         (Float64(), 'data: hello', 'could not convert string to float'),
-        (Measurement(check_fields=True), 'gap: [1, 2, 3]', 'gap'),
+        (Measurement(check_fields=False), 'gap: [1, 2, 3]', 'gap'),
+        (Measurement(check_fields=False), 'sequence: 1.5', "must be of type 'int'"),
+        (Header(stamp=Time(check_fields=False)), 'stamp: {sec: 3000000000}', r'integer in \['),
         (Measurement(), 'header: 5', 'expected to be a dictionary but is a int'),
     ],
 )

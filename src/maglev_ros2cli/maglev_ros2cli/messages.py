@@ -5,7 +5,6 @@ from __future__ import annotations
 import array
 import dataclasses
 import importlib
-import os
 import re
 import sys
 from collections.abc import Callable
@@ -48,8 +47,6 @@ def find_type(name: str, kind: str) -> Any:
         parts.insert(1, kind)
     if len(parts) != 3 or parts[1] != kind or not all(parts):
         raise CommandError(f'The passed {what} type is invalid')
-    # Without these checks the code beneath takes arrays of any length and numbers of any size.
-    os.environ.setdefault('ROS_PYTHON_CHECK_FIELDS', '1')
     try:
         return getattr(importlib.import_module(f'{parts[0]}.{kind}'), parts[2])
     except (ImportError, AttributeError) as error:
@@ -172,6 +169,8 @@ def _fill(message: Any, values: Any, stampers: list[Stamper]) -> None:
     if not isinstance(values, dict):
         kind = type(values).__name__
         raise TypeError(f"Value '{values}' is expected to be a dictionary but is a {kind}")
+    # Else the code beneath takes arrays of any length and numbers of any size, or breaks off.
+    message._check_fields = True
     kinds = message.get_fields_and_field_types()
     for name, value in values.items():
         field = getattr(message, name)
