@@ -46,7 +46,7 @@ def fly(flight: Flight, signals: Signals) -> int:
         complain(f'{name}: failed: {error}')
         passed = False
     if signals.code:
-        complain(f'{name}: interrupted; what was recorded is kept:')
+        complain(f'{name}: interrupted; what was recorded is kept in {flight.out}')
     elif passed:
         say(f'{name}: passed', GREEN)
     else:

@@ -88,6 +88,15 @@ def test_a_signal_stops_the_nodes_in_order(tree: Tree, number: signal.Signals) -
     assert tree.alive() == []
 
 
+def test_what_is_left_of_an_interrupted_run_is_told_with_quiet_too(tree: Tree) -> None:
+    tree.behave('watchers', 'run')
+    process = tree.start('--quiet', '--out', str(tree.out))
+    tree.wait_started()
+    process.send_signal(signal.SIGINT)
+    output, _ = process.communicate(timeout=20)
+    assert output == f'ellipse: interrupted; what was recorded is kept in {tree.out}\n'
+
+
 def test_a_signal_ends_the_analysis(tree: Tree) -> None:
     tree.behave('analyze', 'hang')
     process = tree.start('--out', str(tree.out))
