@@ -21,9 +21,7 @@ ModelMaps = tuple[FloatArray, ...]
 
 _HORIZON = 2.0  # over which old and new internal model are compared [s]
 _STRIDE = 0.005  # between the moments at which they are, at least a sample [s]
-_TURN = (
-    0.5 * np.pi
-)  # of the fastest oscillator between them, at most: at π one state would not show
+_TURN = 0.5 * np.pi  # of the fastest oscillator meanwhile: at π one state would not show
 
 
 def check_retuning(old: ControllerParameters, new: ControllerParameters) -> None:
