@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from runner.console import GREEN, complain, quiet, say, write
 from runner.folder import make_folder, say_where, why_unwritable
 from runner.graph import START_ORDER, STOP_ORDER, Flight
 from runner.logs import NodeLog
+from runner.options import WrongUseError
 from runner.overlays import check_overlay
 from runner.process import Process, last_words, program, run_to_end, why_killed
 from runner.signals import Signals
@@ -29,6 +31,8 @@ def fly(flight: Flight, signals: Signals) -> int:
     """
     for path in flight.overlays:
         check_overlay(path, flight.namespace)
+    if os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE') == 'OFF':
+        raise WrongUseError('with ROS_AUTOMATIC_DISCOVERY_RANGE=OFF no node sees another: unset it')
     commands = {node: flight.program(node) for node in (*START_ORDER, *flight.views)}
     analyze = program('maglev_monitor', 'analyze')
     replay = program('maglev_view', 'replay') if 'view' in flight.views else None

@@ -65,6 +65,16 @@ def test_a_duration_is_what_the_reference_takes() -> None:
     assert (spec.lower, spec.upper) == options.DURATION
 
 
+def test_nodes_that_would_never_see_each_other_are_not_started(
+    tree: Tree, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'OFF')
+    code, output = tree.run()
+    assert code == 2
+    assert 'with ROS_AUTOMATIC_DISCOVERY_RANGE=OFF no node sees another' in output
+    assert not tree.out.exists()
+
+
 @pytest.mark.parametrize(
     ('options', 'words'),
     [

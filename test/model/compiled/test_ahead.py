@@ -43,12 +43,16 @@ print(taken.eighth(3.0), taken.half(5.0), 'numba' in sys.modules)
 """
 
 
-def run(script: str, folder: Path) -> str:
+def run(script: str, folder: Path, *arguments: str) -> str:
     """What a script prints that finds the module, and keeps what is compiled, in a folder."""
     path = os.pathsep.join((str(folder), os.environ.get('PYTHONPATH', '')))
     given = {**os.environ, 'PYTHONPATH': path, 'NUMBA_CACHE_DIR': str(folder / 'cache')}
     done = subprocess.run(
-        [sys.executable, '-c', script], capture_output=True, text=True, env=given, timeout=120.0
+        [sys.executable, '-c', script, *arguments],
+        capture_output=True,
+        text=True,
+        env=given,
+        timeout=120.0,
     )
     assert done.returncode == 0, done.stderr
     return done.stdout
@@ -89,6 +93,39 @@ def test_what_was_compiled_for_another_processor_or_of_other_sources_is_not_used
     assert ahead.folder() != ours
     monkeypatch.delenv('NUMBA_CACHE_DIR')
     assert ahead.folder() is None
+
+
+CALLS = """
+import sys
+from maglev_model import compiled
+compiled.sources_digest = lambda: sys.argv[1]
+import calling
+print(calling.twice(3.0))
+"""
+CALLING = """
+from called import changed
+from maglev_model.compiled import compiled
+
+@compiled
+def twice(value):
+    return 2.0 * changed(value)
+"""
+CALLED = """
+from maglev_model.compiled import compiled
+
+@compiled
+def changed(value):
+    return value + {}
+"""
+
+
+def test_what_calls_changed_sources_is_compiled_anew_also_in_a_shell_that_is_older(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / 'calling.py').write_text(CALLING)
+    for state, added, expected in (('old', 0.0, 6.0), ('new', 1.0, 8.0)):
+        (tmp_path / 'called.py').write_text(CALLED.format(added))
+        assert float(run(CALLS, tmp_path, state)) == expected
 
 
 def test_one_call_of_several_kinds_is_refused(built: Path) -> None:

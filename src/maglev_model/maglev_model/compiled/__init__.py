@@ -73,12 +73,11 @@ def intrinsic(function: Callable[..., Any]) -> Any:
 
 
 def _cache_by_sources(module: Any) -> None:
-    """Give each state of the sources a cache of its own, unless NUMBA_CACHE_DIR names one.
+    """Give each state of the sources a cache of its own, in NUMBA_CACHE_DIR where that is set.
 
     Numba notices a change of a function's own file but not of the functions it calls in others, and
     would go on running the old ones.
     """
-    if 'NUMBA_CACHE_DIR' in os.environ:
-        return
     home = Path(os.environ.get('XDG_CACHE_HOME') or Path.home() / '.cache')
-    module.config.CACHE_DIR = str(home / 'maglev-stage' / sources_digest())
+    place = os.environ.get('NUMBA_CACHE_DIR') or home / 'maglev-stage'
+    module.config.CACHE_DIR = str(Path(place) / sources_digest())
