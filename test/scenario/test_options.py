@@ -94,7 +94,9 @@ def test_nodes_that_would_never_see_each_other_are_not_started(
         (['--params', 'none.yaml'], "there is no file 'none.yaml'"),
         (['--params', 'typo.yaml'], "parameters for 'contoller', which is no node"),
         (['--params', 'twice.yaml'], "'speed' is given twice"),
-        (['--params', 'merged.yaml'], "'<<' in line 4: ROS does not merge mappings"),
+        (['--params', 'merged.yaml'], "'<<' in line 2: ROS does not merge mappings"),
+        (['--params', 'mixed.yaml'], 'the list in line 2 mixes float and int: ROS takes one type'),
+        (['--params', 'alias.yaml'], "'*one' in line 4: ROS follows no aliases"),
         (['--params', 'other.yaml', '--namespace', 'b'], "parameters for '/a/plant', which is no"),
         (['--namespace', ''], "--namespace is ''"),
         (['--namespace', '/'], "--namespace is '/'"),
@@ -110,8 +112,10 @@ def test_nodes_that_would_never_see_each_other_are_not_started(
 def test_options_that_make_no_sense(tree: Tree, options: list[str], words: str) -> None:
     (tree.path / 'typo.yaml').write_text('# why\n\ncontoller:\n  ros__parameters:\n    a: 1\n')
     (tree.path / 'twice.yaml').write_text('plant:\n  ros__parameters: {speed: 1, speed: 2}\n')
-    (tree.path / 'merged.yaml').write_text(
-        'plant: &one\n  ros__parameters: {speed: 1}\nreference:\n  <<: *one\n'
+    (tree.path / 'merged.yaml').write_text('plant:\n  <<: {ros__parameters: {speed: 1}}\n')
+    (tree.path / 'mixed.yaml').write_text('plant:\n  ros__parameters: {speed: [1, 2.0]}\n')
+    (tree.path / 'alias.yaml').write_text(
+        'plant: &one\n  ros__parameters: {speed: 1}\nreference:\n  *one\n'
     )
     (tree.path / 'other.yaml').write_text('/a/plant:\n  ros__parameters: {speed: 1}\n')
     (tree.path / 'flat.yaml').write_text('controller:\n  speed: 1\n')

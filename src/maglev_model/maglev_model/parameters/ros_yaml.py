@@ -30,9 +30,22 @@ def dump(content: object) -> str:
 
 
 class _Loader(yaml.SafeLoader):
-    def __init__(self, stream: str) -> None:
-        super().__init__(stream)
-        self.deep_construct = True  # so that an alias within what it stands for is an error
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        """Raises yaml.YAMLError with an alias and its line."""
+        if self.check_event(yaml.AliasEvent):  # type: ignore[no-untyped-call]
+            alias = self.peek_event()  # type: ignore[no-untyped-call]
+            line = alias.start_mark.line + 1
+            raise yaml.YAMLError(f"'*{alias.anchor}' in line {line}: ROS follows no aliases")
+        return super().compose_node(parent, index)  # type: ignore[no-untyped-call, no-any-return]
+
+    def construct_sequence(self, node: yaml.SequenceNode, deep: bool = False) -> list[Any]:
+        """Raises yaml.YAMLError with the line of a list of several types."""
+        types = sorted({each.tag.rpartition(':')[2] for each in node.value})
+        if len(types) > 1:
+            line = node.start_mark.line + 1
+            mixed = ' and '.join(types)
+            raise yaml.YAMLError(f'the list in line {line} mixes {mixed}: ROS takes one type')
+        return super().construct_sequence(node, deep)
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         """Raises yaml.YAMLError with the key that is none, merges, or is given twice; its line."""
