@@ -25,6 +25,8 @@ STOP = PARAMETERS.machine.gap_max
 
 five = st.tuples(*[st.floats(-1.0, 1.0)] * 5).map(np.array)
 
+LONG = 1000  # samples
+
 
 def looked(watched: GuardArrays, *, flying: bool = True) -> np.ndarray:
     """Which encoders counted."""
@@ -118,14 +120,14 @@ def test_a_bound_that_is_just_reached_is_not_yet_passed() -> None:
         watched.unseen[encoder] = watched_limit(encoder)
         assert not find_stuck(watched.block[0], np.arange(6) == encoder, UNSEEN)
     watched = hovering()
-    watched.residual_then[1] = 0.5 * PARAMETERS.fault.stuck_gap
+    watched.residual_then[1], watched.still[1] = 0.5 * PARAMETERS.fault.stuck_gap, LONG
     assert not find_stuck(watched.block[0], np.arange(6) == 1, CONTRADICTED)
 
 
 def test_a_contradiction_that_is_older_than_its_last_count_says_nothing() -> None:
     watched = hovering()
     watched.believed[0] += 1e-4
-    watched.residual_then[:] = 1e-4
+    watched.residual_then[:], watched.still[:] = 1e-4, LONG
     assert not find_stuck(watched.block[0], np.arange(6) == 1, CONTRADICTED)
 
 
@@ -142,8 +144,10 @@ def test_the_contradiction_is_remembered_since_a_gap_counted(rigid: bool) -> Non
     watched.rigid = rigid
     watched.believed[0] += 4e-5
     watched.residual_then[:] = 7.0
+    watched.still[:] = 7
     looked(watched)
     np.testing.assert_allclose(watched.residual_then, [4e-5] + [7.0 if rigid else 4e-5] * 3)
+    assert watched.still.tolist() == [0] + [8 if rigid else 0] * 3
 
 
 @pytest.mark.parametrize('encoder', range(6))
@@ -247,9 +251,21 @@ def test_one_of_several_is_not_done_without_where_four_gaps_deny_that_it_alone_i
 def test_of_gaps_that_contradict_each_other_half_of_that_is_enough(share: float) -> None:
     watched = hovering()
     watched.unseen[:] = 0.0
-    watched.residual_then[1] = share * PARAMETERS.fault.stuck_gap
+    watched.residual_then[1], watched.still[1] = share * PARAMETERS.fault.stuck_gap, LONG
     assert find_stuck(watched.block[0], np.arange(6) == 1, CONTRADICTED) is (share > 0.5)
     assert bool(watched.trust[1] == LOST) is (share > 0.5)
+
+
+@pytest.mark.parametrize('enough', [False, True])
+def test_what_contradicts_by_more_than_a_platen_moves_since_a_count_is_a_leap_of_another(
+    enough: bool,
+) -> None:
+    """Which is at most 35 mm/s: a sound gap encoder may well not count in two samples."""
+    watched = hovering()
+    watched.unseen[:], watched.residual_then[1] = 0.0, 1.42e-4
+    watched.still[1] = int(1.42e-4 / (0.035 * watched.period)) + enough
+    assert find_stuck(watched.block[0], np.arange(6) == 1, CONTRADICTED) is enough
+    assert bool(watched.trust[1] == LOST) is enough
 
 
 @pytest.mark.parametrize('encoder', [4, 5])

@@ -49,6 +49,7 @@ class GuardArrays(ObserverArrays):
     slip: Annotated[FloatArray, 6]  # what was put right last [m]
     rigid: bool  # whether four believed gaps must be those of a rigid platen
     residual_then: Annotated[FloatArray, 4]  # when a gap encoder counted last [m]
+    still: Annotated[NDArray[np.int64], 4]  # and samples since
     unseen: Annotated[FloatArray, 6]  # how far it should have moved at least since its last count
     silent: Annotated[NDArray[np.int64], 6]  # samples in flight in which it has not counted
     stood: Annotated[NDArray[np.int8], 2]  # 1 where x, z are lost because they stood still

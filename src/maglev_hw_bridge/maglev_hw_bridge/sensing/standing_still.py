@@ -67,8 +67,10 @@ def look(g: GuardArrays, flying: bool, counted: Flags) -> None:
             g.unseen[i] = 0.0
         else:
             g.unseen[i] += _least_step(g, i)
-        if i < 4 and (counted[i] or not g.rigid):
-            g.residual_then[i] = residual
+        if i < 4:
+            g.still[i] += 1
+            if counted[i] or not g.rigid:
+                g.residual_then[i], g.still[i] = residual, 0
         asked = flying and settled and g.trust[i] != LOST
         asked = asked and not (counted[i] or observer.supported(g, Y))
         g.silent[i] = g.silent[i] + 1 if asked else 0
@@ -237,14 +239,16 @@ def find_stuck(g: GuardArrays, doubted: Flags, doubt: int) -> bool:
     """Do without the encoders that are doubted for too long; whether there are new ones.
 
     Several that stand still may all be stuck where the first of them alone cannot be: that is not
-    done without before the others, and by then those may have counted.
+    done without before the others, and by then those may have counted. What contradicts by more
+    than a platen moves since one counted is a leap of another, as of one that is noisy.
     """
     found = False
     denied = doubt == UNSEEN and _denied(g, doubted, 1.0)
     for i in range(6):
         gone = abs(g.unseen[i]) > _unseen_limit(g, i, doubted) and not (denied and i < 4)
         if i < 4 and doubt == CONTRADICTED:
-            gone = _residual_since(g, i) > 0.5 * g.max_unseen[i]
+            since = _residual_since(g, i)
+            gone = 0.5 * g.max_unseen[i] < since <= g.still[i] * g.period * _LEAP
         if doubted[i] and gone:
             g.blamed[i], found = 1, True
     for i in range(6):
