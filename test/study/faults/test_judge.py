@@ -137,6 +137,8 @@ def test_2_a_cut_is_judged_by_the_hardest_stop_of_its_fall() -> None:
     assert judge._fall_from(0) > 0.3
     judge._state[0, [8, 9]] = 0.0
     assert 0.0 < judge._fall_from(0) < 0.05
+    judge._state[0, [4, 5]] = 0.04, 0.2  # slides on, to the stop of z
+    assert 0.1 < judge._fall_from(0) < 0.2
 
 
 def test_3_outputs_left_on(flown: Flown, monkeypatch: pytest.MonkeyPatch) -> None:

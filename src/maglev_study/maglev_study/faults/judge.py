@@ -172,7 +172,7 @@ class Judge:
             first = self._first_sign([], _HIDDEN)
             gaps = sum(encoder < 4 for encoder in expected.stuck)
             expected = expected._replace(impact=CUT if gaps > 1 else expected.impact)
-        impact = max(self.flight.world.rig.impact, self._across())
+        impact = max(self.flight.world.rig.impact, self._across(self._state[: self._n]))
         self._judge_detection(expected, first)
         if not hidden:
             self._judge_course()
@@ -291,10 +291,9 @@ class Judge:
         run = np.convolve(quiet & aloft, np.ones(samples), 'valid')
         return bool(np.any(run >= samples))
 
-    def _across(self) -> float:
-        """Greatest speed at which the platen met a stop along X or Z [m/s]."""
-        machine, state = self.flight.parameters.machine, self._state[: self._n]
-        worst = 0.0
+    def _across(self, state: FloatArray) -> float:
+        """Greatest speed at a stop along X or Z, by the platen's states (n, 10) [m/s]."""
+        machine, worst = self.flight.parameters.machine, 0.0
         for axis, stop in ((1, machine.x_max), (2, machine.z_max)):
             there = np.abs(state[:, 2 * axis]) >= stop - 1e-9
             met = np.flatnonzero(there[1:] & ~there[:-1])
@@ -313,8 +312,10 @@ class Judge:
         rig.arrays.current[:] = 0.0
         rig.forget_impact()
         rest = np.array(self.flight.parameters.emulation.wiring.offset)
-        for _ in range(self.flight.samples_in(_FALL)):
+        states = np.empty((self.flight.samples_in(_FALL), 10))
+        for state in states:
             rig.advance(rest)
-        speed = rig.impact
+            state[:] = rig.stage.state
+        speed = max(rig.impact, self._across(states))
         rig.arrays.block[:], rig.stage.block[:] = saved
         return speed
