@@ -89,7 +89,7 @@ def pytest_runtest_makereport(
     """With a test that failed goes what the nodes said that it started."""
     report = yield
     nodes = getattr(item, 'funcargs', {}).get('nodes')
-    if report.failed and nodes is not None:
-        for process in nodes.started:
+    if report.failed:
+        for process in getattr(nodes, 'started', ()):  # a parameter may have that name, too
             report.sections.append((f'log of {process.log.stem}', process.output[-6000:]))
     return report
