@@ -16,7 +16,7 @@ from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_model.axes import FloatArray
 from maglev_model.commutation import phase_currents
 from maglev_model.compiled import borrowing, compiled
-from maglev_model.compiled.arrays import put
+from maglev_model.compiled.arrays import copy_to
 from maglev_model.compiled.records import Block, Record
 
 # What drive() returns.
@@ -85,7 +85,7 @@ def _put_out(amplifier: AmplifierArrays) -> bool:
 @compiled
 def _drive_phases(block: Block, current: FloatArray) -> None:
     amplifier: AmplifierArrays = block[0]
-    put(current, amplifier.wanted)
+    copy_to(current, amplifier.wanted)
     _put_out(amplifier)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from maglev_model.axes import FloatArray
 from maglev_model.commutation import electrical_angle, phase_currents
 from maglev_model.compiled import borrowing, compiled
-from maglev_model.compiled.arrays import put
+from maglev_model.compiled.arrays import copy_to
 from maglev_model.machine import Machine
 from maglev_plant.amplifier import limit_phase, set_targets
 from maglev_plant.arrays import StageArrays
@@ -145,8 +145,8 @@ def _currents_of_step(
         carry_currents(
             machine, effects.motors, effects.winding, stage.state, aimed, stage.step, current[0]
         )
-        put(current[0], current[1])
-        put(current[0], current[2])
+        copy_to(current[0], current[1])
+        copy_to(current[0], current[2])
         return
     for i in range(8):
         current[0, i] = stage.target[i] + stage.lag_start * lag[i]
@@ -161,7 +161,7 @@ def _carry_platen(
 ) -> None:
     """One step of the platen and of what it drags along."""
     effects, before = stage.effects, work[5]
-    put(stage.state, before)
+    copy_to(stage.state, before)
     if effects.floor.on:
         shake(effects.floor)
     begin_step(effects.friction, stage.state, stage.step)
@@ -194,5 +194,5 @@ def advance_rough(stage: StageArrays, machine: Machine) -> None:
     if effects.by_phases:
         flowing_currents(effects.motors, effects.winding, stage.state, stage.flowing)
     else:
-        put(current[2], stage.flowing)
+        copy_to(current[2], stage.flowing)
     stage.sample += 1

@@ -17,7 +17,7 @@ from maglev_controller.step.sample import OK, conclude, currents_of_w, decide
 from maglev_controller.step.voltage import keep_within_voltage
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import borrowing, compiled
-from maglev_model.compiled.arrays import put
+from maglev_model.compiled.arrays import copy_to
 from maglev_model.inverse import CURRENT, clip
 from maglev_model.machine_array import machine_from_array
 from maglev_model.platen import output_accelerations
@@ -126,7 +126,7 @@ def close_with_currents(
     if keep_within_voltage(settings, machine, sample, axes, direct, quadrature):
         limited_by |= CURRENT
     conclude(ControlArrays(records, models, transition, xi))
-    put(sample.realised, sample.virtual_input)
+    copy_to(sample.realised, sample.virtual_input)
     return limited_by
 
 

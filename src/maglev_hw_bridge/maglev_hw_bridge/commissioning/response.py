@@ -42,7 +42,7 @@ class Pulses:
         peak: float,
         settles: bool = True,
     ) -> None:
-        """``peak``: largest phase current [A]; ``settles``: the platen comes to rest at the end."""
+        """``peak``: largest phase current [A]; ``settles``: wait for the platen at the end too."""
         self._driver, self._encoders, self._amplifiers = driver, encoders, amplifiers
         self._period = parameters.sample_time
         self._peak = peak
@@ -167,7 +167,7 @@ class _Twin:
         self._rig = Rig(twin)
         self._rest = parameters.machine.gap_max
         driver = _RigDriver(self._rig)
-        self._pulses = Pulses(twin, driver, Encoders(twin), Amplifiers(twin), peak, False)
+        self._pulses = Pulses(twin, driver, Encoders(twin), Amplifiers(twin), peak, settles=False)
 
     def phase(self, phase: int, place: FloatArray) -> FloatArray:
         self._rig.place(np.array([self._rest, place[0], place[1], 0.0, 0.0]))

@@ -18,7 +18,7 @@ from maglev_hw_bridge.signal_parameters import check_places, check_signs
 from maglev_model.axes import FloatArray
 from maglev_model.commutation import direct_quadrature_currents
 from maglev_model.compiled import borrowing, compiled
-from maglev_model.compiled.arrays import put
+from maglev_model.compiled.arrays import copy_to
 from maglev_model.compiled.records import Block, Record
 from maglev_model.machine import Machine
 from maglev_model.machine_array import machine_from_array
@@ -95,7 +95,7 @@ def _aim(
     if rig.driven:
         aim(stage.effects.drive, n / steps, (n + 1) / steps, out)
     else:
-        put(wanted, out)
+        copy_to(wanted, out)
     for i in range(12):
         out[i] = min(max(out[i], -rig.peak), rig.peak)
 
@@ -114,7 +114,7 @@ def _carry(rig: RigArrays, stage: StageArrays, machine: Machine, targets: FloatA
             stage.step,
             stage.command,
         )
-        put(effects.winding.phase, rig.current)
+        copy_to(effects.winding.phase, rig.current)
         return
     before = rig.current.copy()
     _flow(rig, targets)
@@ -167,8 +167,8 @@ def count(rig_block: Block, stage_block: Block, out: CountArray) -> None:
 def tell(stage_block: Block, out: FloatArray) -> None:
     """The truth behind the counts taken last, ``out`` (24,), as :meth:`Rig.tell` has it."""
     stage: StageArrays = stage_block[0]
-    put(stage.state, out[:10])
-    put(stage.command, out[10:18])
+    copy_to(stage.state, out[:10])
+    copy_to(stage.command, out[10:18])
     for i in range(6):
         out[18 + i] = stage.effects.sensor.own[i] - stage.reading[i]
 

@@ -32,7 +32,7 @@ from maglev_hw_bridge.sensing.standing_still import (
 )
 from maglev_model.axes import PHI, THETA, FloatArray, Y
 from maglev_model.compiled import borrowing, compiled
-from maglev_model.compiled.arrays import put
+from maglev_model.compiled.arrays import copy_to
 from maglev_model.compiled.records import Block
 
 # What watch() returns.
@@ -109,7 +109,7 @@ def _begin(g: GuardArrays) -> int:
     if g.samples == 0:
         lost = _lose_impossible(g)
         observer.start(g, g.believed)
-        put(g.believed, g.past[0])
+        copy_to(g.believed, g.past[0])
         g.residual_then[:] = gap_residual(g.believed)
         await_lift_off(g)
         return JUMP if lost else FINE
@@ -177,8 +177,8 @@ def watch(
             code, index = MOTORS, axis
         else:
             code, index = _out_of_range(g)
-    put(g.past[0], g.past[1])
-    put(g.believed, g.past[0])
+    copy_to(g.past[0], g.past[1])
+    copy_to(g.believed, g.past[0])
     g.samples = g.samples + 1 if math.isfinite(np.sum(g.position)) else 0
     return code, index
 

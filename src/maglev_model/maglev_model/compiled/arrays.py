@@ -10,7 +10,7 @@ from maglev_model.compiled import borrowing
 
 
 @borrowing
-def put(values: NDArray[Any], target: NDArray[Any]) -> None:
+def copy_to(values: NDArray[Any], target: NDArray[Any]) -> None:
     """Copy ``values`` (n,) into ``target`` (n,).
 
     As ``target[:] = values``, for which Numba compiles what would be said of unlike shapes: seconds

@@ -14,7 +14,7 @@ import numpy as np
 
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import compiled
-from maglev_model.compiled.arrays import put
+from maglev_model.compiled.arrays import copy_to
 from maglev_model.compiled.records import Record
 from maglev_plant.random_numbers import drawn, gaussian_of
 
@@ -55,7 +55,7 @@ def drive_arrays(parameters: PlantParameters) -> DriveArrays:
 def command_phases(drive: DriveArrays, seed: int, sample: int, wanted: FloatArray) -> None:
     """Take one sample's phase currents ``wanted`` (12,) [A] as the newest command."""
     for k in range(HISTORY - 1, 0, -1):
-        put(drive.history[k - 1], drive.history[k])
+        copy_to(drive.history[k - 1], drive.history[k])
     for phase in range(12):
         current = wanted[phase]
         if drive.count > 0.0:
@@ -72,7 +72,7 @@ def command_phases(drive: DriveArrays, seed: int, sample: int, wanted: FloatArra
 def aim(drive: DriveArrays, begin: float, end: float, target: FloatArray) -> None:
     """Write what is aimed at between two shares of a sample, ``target`` (12,) [A]."""
     if drive.latency == 0.0:
-        put(drive.history[0], target)
+        copy_to(drive.history[0], target)
         return
     target[:] = 0.0
     for k in range(HISTORY):

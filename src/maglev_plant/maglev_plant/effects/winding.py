@@ -27,7 +27,7 @@ import numpy as np
 from maglev_model.axes import FloatArray
 from maglev_model.commutation import direct_quadrature_currents, phase_currents
 from maglev_model.compiled import borrowing, compiled
-from maglev_model.compiled.arrays import put
+from maglev_model.compiled.arrays import copy_to
 from maglev_model.compiled.records import Record
 from maglev_model.machine import Machine
 from maglev_model.motor import force_coefficients
@@ -172,7 +172,7 @@ def _middle(winding: WindingArrays, state: FloatArray, step: float) -> FloatArra
         speed = 2 * axis + 1
         middle[speed] += 0.5 * (state[speed] - winding.last[speed])
         middle[speed - 1] += 0.25 * step * (state[speed] + middle[speed])
-    put(state, winding.last)
+    copy_to(state, winding.last)
     return middle
 
 
