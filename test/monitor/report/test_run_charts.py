@@ -16,7 +16,7 @@ from maglev_monitor.bag.analysis import analyse
 from maglev_monitor.metrics import curves
 from maglev_monitor.metrics.curves import COLUMNS
 from maglev_monitor.metrics.run_parameters import RunParameters
-from maglev_monitor.report.error_charts import spectrum
+from maglev_monitor.report.error_charts import reversals, spectrum
 from maglev_monitor.report.run_charts import charts
 
 
@@ -61,3 +61,29 @@ def test_the_spectrum_s_integral_is_the_variance_of_what_its_caption_names(perio
     assert abs(sine - 0.5) < 0.02
     assert total < 0.1 * (1e6 * error).var()
     assert chart.caption.endswith('the variance of what is faster than 0.98 Hz.')
+
+
+@pytest.mark.parametrize('gap', [1, 305])
+def test_samples_that_are_missing_shift_no_frequency_and_no_velocity(gap: int) -> None:
+    """As in a bag of a recorder that loses some, or of two trajectories with a hover between."""
+    sequence = np.concatenate([np.arange(1200), np.arange(1200 + gap, 3000 + gap)])
+    values = np.zeros((len(sequence), COLUMNS['saturated'].stop))
+    time = 1e-3 * sequence
+    values[:, COLUMNS['true_error'].start] = 1e-6 * np.sin(100.0 * np.pi * time)
+    values[:, COLUMNS['reference'].start] = 1e-3 * time
+    result, curves = {'error_source': 'true'}, SimpleNamespace(tail=(sequence, values))
+    analysis: Any = SimpleNamespace(run=RunParameters(), result=result, curves=curves)
+    density = spectrum(analysis).panels[0].renderers[0].data_source.data  # type: ignore[union-attr]
+    assert density['x'][np.argmax(density['y'])] == pytest.approx(50.0, abs=1.0)
+    assert np.max(density['y'][density['x'] > 200.0]) < 1e-6 * np.max(density['y'])
+    errors = reversals(analysis).panels[0].renderers[0].data_source.data  # type: ignore[union-attr]
+    np.testing.assert_allclose(errors['x'], 1.0, rtol=1e-4)  # [mm/s]
+
+
+def test_errors_that_are_known_at_every_other_sample_have_no_spectrum() -> None:
+    values = np.zeros((3000, COLUMNS['saturated'].stop))
+    values[:, COLUMNS['true_error'].start] = np.sin(np.arange(3000))
+    values[::2, COLUMNS['true_error'].start] = np.nan
+    result, curves = {'error_source': 'true'}, SimpleNamespace(tail=(np.arange(3000), values))
+    analysis: Any = SimpleNamespace(run=RunParameters(), result=result, curves=curves)
+    assert spectrum(analysis) is None

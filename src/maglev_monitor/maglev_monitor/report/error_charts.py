@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import signal
 
-from maglev_model.axes import AXES
+from maglev_model.axes import AXES, FloatArray
 from maglev_monitor.bag.analysis import Analysis
 from maglev_monitor.report.chart import (
     COLOURS,
@@ -35,8 +36,7 @@ def spectrum(analysis: Analysis) -> Chart | None:
     for axes, unit in (((0, 1, 2), 'µm'), ((3, 4), 'µrad')):
         panel = panels.panel('', f'[{unit}/√Hz]')
         for colour, index in zip(COLOURS, axes, strict=False):
-            error = 1e6 * values[:, column(f'{source}_error', index).place]
-            error = error[np.isfinite(error)]
+            error = 1e6 * _unbroken(sequence, values[:, column(f'{source}_error', index).place])
             if len(error) < least or np.ptp(error) == 0.0:
                 continue
             frequency, power = signal.welch(error, rate, nperseg=min(window, len(error)))
@@ -47,11 +47,18 @@ def spectrum(analysis: Analysis) -> Chart | None:
     if not drawn:
         return None
     caption = (
-        'Amplitude spectral density of the errors over the samples of the figure above: integrated '
-        'over the frequency, its square is the variance of what is faster than '
-        f'{1.0 / _WINDOW:.2g} Hz.'
+        'Amplitude spectral density of the errors over the longest stretch of the figure above in '
+        'which no sample is missing: integrated over the frequency, its square is the variance of '
+        f'what is faster than {1.0 / _WINDOW:.2g} Hz.'
     )
     return Chart('Spectrum of the errors', caption, drawn)
+
+
+def _unbroken(sequence: NDArray[np.int64], values: FloatArray) -> FloatArray:
+    """The longest part of values (n,) in which none is missing: a spectrum wants even samples."""
+    known = np.flatnonzero(np.isfinite(values))
+    gaps = np.flatnonzero(np.diff(sequence[known]) != 1) + 1
+    return max(np.split(values[known], gaps), key=len)
 
 
 def reversals(analysis: Analysis) -> Chart | None:
@@ -63,7 +70,7 @@ def reversals(analysis: Analysis) -> Chart | None:
         if len(sequence) < 2 or np.ptp(wanted) < MOVES:
             continue
         milli, micro = units(axis)
-        velocity = np.gradient(wanted, analysis.run.sample_time)
+        velocity = np.gradient(wanted, sequence * analysis.run.sample_time)
         panel = Panels(f'velocity of the reference [{milli}/s]').panel(axis, f'e [{micro}]')
         error = 1e6 * values[:, column(f'{source}_error', index).place]
         line(panel, 1e3 * velocity, error, 'e', ERROR, line_width=0.8)
