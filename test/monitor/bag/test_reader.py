@@ -104,6 +104,21 @@ def test_a_bag_without_metadata_is_read(bag: Path, tmp_path: Path, run: Any) -> 
     assert 'no metadata.yaml' in notes[0]
 
 
+@pytest.mark.parametrize(
+    'text', [b'', b'rosbag2_bagfile_information:\n  ver', b'a: [', b'at: 2026-99-99', b'\xff\x00']
+)
+def test_a_bag_whose_metadata_cannot_be_read_says_so(
+    text: bytes, bag: Path, tmp_path: Path, run: Any
+) -> None:
+    copy = tmp_path / 'copy'
+    shutil.copytree(bag, copy)
+    (copy / 'metadata.yaml').write_bytes(text)
+    counts, notes = read(copy)
+    assert counts['plant'] == len(run)
+    assert notes == [f"'{copy}' has a metadata.yaml that cannot be read: read without it"]
+    assert Bag(copy).custom() == {}
+
+
 @pytest.mark.parametrize('place', ['bag', 'bag/bag_0.mcap', 'bag/metadata.yaml', '.'])
 def test_a_bag_is_found_by_any_of_its_names(place: str, bag: Path, run: Any) -> None:
     counts, notes = read(bag.parent / place)

@@ -69,14 +69,21 @@ class Bag:
 
     def custom(self) -> dict[str, str]:
         """What the bag says of itself besides, by name; nothing where it is cut off."""
+        found = (self._information() or {}).get('custom_data')
+        if not isinstance(found, dict):
+            return {}
+        return {str(name): str(value) for name, value in found.items() if value}
+
+    def _information(self) -> dict[str, Any] | None:
+        """What rosbag2 wrote of the bag; None where there is nothing that can be read."""
         folder = self.path.parent if self.path.is_file() else self.path
         try:
             text = (folder / 'metadata.yaml').read_text(encoding='utf-8', errors='replace')
             loader = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
-            found = yaml.load(text, loader)['rosbag2_bagfile_information']['custom_data'] or {}
-            return {str(name): str(value) for name, value in found.items() if value}
-        except (OSError, yaml.YAMLError, KeyError, TypeError, AttributeError):
-            return {}
+            found = yaml.load(text, loader)['rosbag2_bagfile_information']
+        except (OSError, yaml.YAMLError, ValueError, KeyError, TypeError):
+            return None
+        return found if isinstance(found, dict) else None
 
     def batches(self) -> Iterator[Batch]:
         """The bag's content in the order it was written. Raises :class:`BagError`."""
@@ -120,15 +127,20 @@ class Bag:
                 self.notes.append(
                     f"'{path.name}' is not whole, {file.damage}: {recovered} messages recovered"
                 )
-            elif number == 0 and self.path.is_dir() and not (self.path / 'metadata.yaml').is_file():
-                self.notes.append(f"'{self.path}' has no metadata.yaml: read without it")
+            elif number == 0 and self.path.is_dir() and self._information() is None:
+                self.notes.append(self._without_metadata())
         if self._progress:
             self._progress.tell(1, 1)  # what is no message lies behind them
+
+    def _without_metadata(self) -> str:
+        there = (self.path / 'metadata.yaml').is_file()
+        which = 'a metadata.yaml that cannot be read' if there else 'no metadata.yaml'
+        return f"'{self.path}' has {which}: read without it"
 
     def _read_by_rosbags(self) -> Iterator[list[TopicMessages]]:
         whole = self.path.is_file() or (self.path / 'metadata.yaml').is_file()
         if not whole:
-            self.notes.append(f"'{self.path}' has no metadata.yaml: read without it")
+            self.notes.append(self._without_metadata())
         for path in [self.path] if whole else self.files:
             yield from self._read_one_by_rosbags(path)
 
