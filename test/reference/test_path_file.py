@@ -124,6 +124,7 @@ def scaled(column, factor):
     [
         (cell(0, 5, 'psi'), "line 1: the columns are 't,y,x,z,phi,psi', they must be 't,y,x"),
         (lambda lines: lines[1:], 'line 1: the columns are'),
+        (lambda lines: ['0' * 200_000], r'line 1: field larger than field limit'),
         (lambda lines: [], 'has 0 rows'),
         (lambda lines: lines[:8], 'has 7 rows, a trajectory needs at least 8'),
         (cell(17, 3, 'nan'), "line 18: z is 'nan', it must be a finite number"),

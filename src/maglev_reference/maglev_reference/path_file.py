@@ -78,7 +78,7 @@ def read_table(path: Path) -> tuple[FloatArray, list[int]]:
     for number, line in enumerate(text.splitlines(), start=1):
         if not line.strip() or line.lstrip().startswith('#'):
             continue
-        cells = [cell.strip() for cell in next(csv.reader([line]))]
+        cells = _cells(line, path, number)
         if header is None:
             header = cells
             _check_header(header, path, number)
@@ -91,6 +91,13 @@ def read_table(path: Path) -> tuple[FloatArray, list[int]]:
     _check_units(table, path, lines)
     _check_spacing(table[:, 0], path, lines)
     return table, lines
+
+
+def _cells(line: str, path: Path, number: int) -> list[str]:
+    try:
+        return [cell.strip() for cell in next(csv.reader([line]))]
+    except csv.Error as error:  # as of a file that is none of rows
+        raise ParameterError(f"'{path}' line {number}: {error}") from error
 
 
 def _check_header(header: Iterable[str], path: Path, line: int) -> None:
