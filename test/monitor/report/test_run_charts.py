@@ -63,6 +63,17 @@ def test_the_spectrum_s_integral_is_the_variance_of_what_its_caption_names(perio
     assert chart.caption.endswith('the variance of what is faster than 0.98 Hz.')
 
 
+def test_the_spectrum_of_short_tracking_names_the_least_frequency_that_it_has() -> None:
+    """Of 0.6 s, less than a segment of it takes, that is 1 / 0.6 s."""
+    values = np.zeros((600, COLUMNS['saturated'].stop))
+    values[:, COLUMNS['true_error'].start] = np.sin(np.arange(600))
+    result, curves = {'error_source': 'true'}, SimpleNamespace(tail=(np.arange(600), values))
+    analysis: Any = SimpleNamespace(run=RunParameters(), result=result, curves=curves)
+    chart: Any = spectrum(analysis)
+    assert chart.panels[0].renderers[0].data_source.data['x'][0] == pytest.approx(1.0 / 0.6)
+    assert chart.caption.endswith('faster than 1.7 Hz.')
+
+
 @pytest.mark.parametrize('gap', [1, 305])
 def test_samples_that_are_missing_shift_no_frequency_and_no_velocity(gap: int) -> None:
     """As in a bag of a recorder that loses some, or of two trajectories with a hover between."""

@@ -32,7 +32,7 @@ def spectrum(analysis: Analysis) -> Chart | None:
     if len(sequence) < least:
         return None
     panels = Panels('frequency [Hz]', x_axis_type='log', y_axis_type='log', height=300)
-    drawn = []
+    drawn, slowest = [], 0.0
     for axes, unit in (((0, 1, 2), 'µm'), ((3, 4), 'µrad')):
         panel = panels.panel('', f'[{unit}/√Hz]')
         for colour, index in zip(COLOURS, axes, strict=False):
@@ -40,6 +40,7 @@ def spectrum(analysis: Analysis) -> Chart | None:
             if len(error) < least or np.ptp(error) == 0.0:
                 continue
             frequency, power = signal.welch(error, rate, nperseg=min(window, len(error)))
+            slowest = max(slowest, float(frequency[1]))
             line(panel, frequency[1:], np.sqrt(power[1:]), AXES[index], colour)
         if panel.renderers:
             legend(panel)
@@ -49,7 +50,7 @@ def spectrum(analysis: Analysis) -> Chart | None:
     caption = (
         'Amplitude spectral density of the errors over the longest stretch of the figure above in '
         'which no sample is missing: integrated over the frequency, its square is the variance of '
-        f'what is faster than {1.0 / _WINDOW:.2g} Hz.'
+        f'what is faster than {slowest:.2g} Hz.'
     )
     return Chart('Spectrum of the errors', caption, drawn)
 
