@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from types import SimpleNamespace
 
@@ -11,6 +12,7 @@ from made_up_run import Encoder, Run, make_run
 
 from maglev_model.contract.phases import Phase
 from maglev_monitor.metrics.decoding import decode
+from maglev_view.colours import colour_of
 from maglev_view.parameters import WebParameters
 from maglev_view.web.guard import trusted
 from maglev_view.web.live import Live
@@ -110,6 +112,17 @@ def test_bars_are_full_at_the_limit(live: Live) -> None:
     assert widths == ['0.0', '25.0', '50.0', '50.0', '100.0', '100.0', '100.0', '100.0']
     live.load = None
     assert 'heat' not in motors_html(live, 7.0)
+
+
+def test_currents_that_are_no_numbers_are_shown_as_such(run: Run, live: Live) -> None:
+    """As of a controller of one's own: the page with its emergency stop does not end by them."""
+    rows = decode('currents', [Encoder().message(run, 'currents', 0)]).copy()
+    rows['direct_current'] = [np.nan, np.inf, -np.inf, 0.0]
+    live.take('currents', rows)
+    text = motors_html(live, 7.0)
+    assert 'nan of 7 A' in text
+    assert text.count('width:100.0%') == 3
+    assert colour_of(math.nan) == colour_of(math.inf) == colour_of(1.0)
 
 
 def test_the_load_of_a_real_amplifier_comes_from_its_diagnostics(live: Live) -> None:

@@ -9,7 +9,7 @@ from html import escape
 import numpy as np
 
 from maglev_model.axes import AXES
-from maglev_view.colours import AXIS_COLOURS, colour_of
+from maglev_view.colours import AXIS_COLOURS, colour_of, within
 from maglev_view.web.live import Live
 
 _SCALE, _UNITS = 1e6, ('µm', 'µm', 'µm', 'µrad', 'µrad')
@@ -77,7 +77,7 @@ def motors_html(live: Live, peak: float) -> str:
 
 
 def _bar(share: float, text: str) -> str:
-    share = min(max(share, 0.0), 1.0)
+    share = within(share)
     red, green, blue = (round(255 * part) for part in colour_of(share))
     return (
         f'<td style="{_CELL};width:40%"><div style="background:#8884;height:6px">'
