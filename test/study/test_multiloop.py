@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_model.axes import AXES
-from maglev_model.parameters import ParameterError, build
+from maglev_model.parameters import ParameterError, build, from_yaml, replace
 from maglev_plant.parameters import PlantParameters
 from maglev_study.multiloop import NOTHING, MultiLoop, multiloop, structured_bound
 from maglev_study.robustness.guarantee import first_unstable
@@ -19,6 +20,7 @@ from maglev_study.robustness.guarantee import first_unstable
 control = pytest.importorskip('control', reason='python-control comes with the test tools')
 
 PLANT = build(PlantParameters, {'amplifier.bandwidth': 2000.0, 'guide.viscous': (0.5,) * 5})
+PARAMS = Path(__file__).resolve().parents[2] / 'params'
 TILTED = (0.022, 0.0, 0.0, 0.001, 0.006)
 
 
@@ -121,3 +123,21 @@ def test_an_axis_without_control_has_no_part_in_it() -> None:
     loop, whole = (multiloop(PLANT, speed=0.1, controller=law) for law in (level, None))
     assert len(loop.controller.state) == len(whole.controller.state) * 3 // 5
     assert loop.guarantees() == (NOTHING, NOTHING)  # magnets turn it over: springs are too soft
+
+
+def test_an_axis_that_is_locked_has_no_part_in_it_either() -> None:
+    """The loops that are left are those of the axes, with their margins and not without any."""
+    level = build(ControllerParameters, {'phi.controlled': False, 'theta.controlled': False})
+    locked = replace(PLANT, {'guide.locked': (False, False, False, True, True)})
+    loop, whole = (multiloop(locked, speed=0.1, controller=level), multiloop(PLANT, speed=0.1))
+    assert loop.stable()
+    assert len(loop.plant.state) == len(whole.plant.state) - 4
+    for guaranteed, least in zip(loop.guarantees(), whole.guarantees(), strict=True):
+        assert guaranteed.disk >= least.disk > 0.5
+
+
+def test_the_machine_with_one_motor_has_guarantees() -> None:
+    files = (PARAMS / 'machine.yaml', PARAMS / 'single_motor.yaml')
+    plant = from_yaml(PlantParameters, 'plant', *files)
+    loop = multiloop(plant, controller=from_yaml(ControllerParameters, 'controller', *files))
+    assert min(guaranteed.gain for guaranteed in loop.guarantees()) > 6.0

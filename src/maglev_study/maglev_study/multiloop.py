@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import block_diag
 
 from maglev_controller.design.axis_design import controller_system, resting
@@ -165,8 +165,10 @@ def multiloop(
     stage = StageAt(given, at, speed)
     inverse = inverse_slopes(stage, known)
     read, outputs = _encoders(given, stage.position)
-    plant = _plant(stage, inverse.flowing, read, known.sample_time, delay)
     free = [index for index, axis in enumerate(known.axes) if axis.controlled]
+    moves = stage.arrays.locked == 0
+    moves[free] = True
+    plant = _plant(stage, inverse.flowing, read, moves, known.sample_time, delay)
     systems = []
     for index in free:
         design = law.design(known, AXES[index])
@@ -196,12 +198,24 @@ def _encoders(given: PlantParameters, position: FloatArray) -> tuple[FloatArray,
 
 
 def _plant(
-    stage: StageAt, flowing: FloatArray, read: FloatArray, period: float, delay: int
+    stage: StageAt,
+    flowing: FloatArray,
+    read: FloatArray,
+    moves: NDArray[np.bool_],
+    period: float,
+    delay: int,
 ) -> Part:
-    """Currents, held over a sample and ``delay`` samples late, to readings."""
-    state, driven = discretise(*stage.lagging_slopes(flowing), period)
-    output = np.zeros((6, len(state)))
+    """Currents, held over a sample and ``delay`` samples late, to readings, by what ``moves`` (5,).
+
+    An axis that is locked would be an integrator, which passes for a loop that is not stable.
+    """
+    by_state, by_current = stage.lagging_slopes(flowing)
+    output = np.zeros((6, len(by_state)))
     output[:, :10:2] = read
+    kept = np.ones(len(by_state), dtype=np.bool_)
+    kept[:10] = np.repeat(moves, 2)
+    state, driven = discretise(by_state[np.ix_(kept, kept)], by_current[kept], period)
+    output = output[:, kept]
     for _ in range(delay):
         state = np.block([[state, driven], [np.zeros((8, len(state) + 8))]])
         driven = np.vstack((np.zeros((len(state) - 8, 8)), np.eye(8)))
