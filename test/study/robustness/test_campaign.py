@@ -24,6 +24,7 @@ from maglev_model.parameters import ParameterError, from_yaml
 from maglev_model.programs.optional import MissingLibraryError
 from maglev_model.programs.progress import Progress
 from maglev_plant.parameters import PlantParameters
+from maglev_reference.parameters import ReferenceParameters
 from maglev_study.command import DONE, INTERRUPTED, WRONG_USE
 from maglev_study.robustness import fleet, guarantee
 from maglev_study.robustness.draw import NOMINAL
@@ -332,6 +333,16 @@ def test_a_machine_is_written_for_the_graph(plan: Plan, tmp_path: Path) -> None:
     assert from_yaml(PlantParameters, 'plant', path) == plan.draw(contestant, 2).plant
     assert from_yaml(ControllerParameters, 'controller', path) == contestant.controller
     assert run([*call, '2', '--law', 'paper', 'default']) == WRONG_USE
+
+
+@pytest.mark.parametrize(('law', 'amplitude'), [('default', 0.01), ('regulator_3dof', 0.0)])
+def test_the_graph_flies_what_the_campaign_flew(law: str, amplitude: float, tmp_path: Path) -> None:
+    call = ['--params', str(PARAMS), '--out', str(tmp_path), '--law', law, '--replay', '1']
+    assert run(call) == DONE
+    files = PARAMS / 'scenario_ellipse_4dof.yaml', tmp_path / 'machine-1.yaml'
+    course = from_yaml(ReferenceParameters, 'reference', *files).sinusoids
+    assert course.theta.amplitude == (amplitude,)
+    assert course.x.amplitude == (0.03,)
 
 
 @pytest.mark.parametrize(
