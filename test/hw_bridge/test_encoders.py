@@ -141,6 +141,8 @@ def test_a_second_homing_elsewhere_is_refused() -> None:
         ('fault.stale', 0.001, 'two sample times'),
         ('fault.lower', (0.04, -1.0, -1.0, -1.0, -1.0), 'less than'),
         ('fault.command_limit', 1.0, 'at least'),
+        ('fault.over_current', 1.5, r"'landing\.current' is 5 A.*'fault\.over_current' \(1\.5 A\)"),
+        ('landing.current', 10.6, r"'landing\.current' is 10\.6 A, it must not exceed"),
         ('homing.wrong', 1.0, 'no parameter'),
         ('emulation.encoder.gap_resolution', 5e-2, 'must lie in'),
     ],

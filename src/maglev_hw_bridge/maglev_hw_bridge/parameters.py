@@ -149,6 +149,11 @@ class FaultParameters:
                 f"'fault.gap_upper' ({self.gap_upper:g} m)"
             )
 
+    @property
+    def largest_amplitude(self) -> float:
+        """Largest amplitude of a motor's dq current that is no fault [A]."""
+        return min(self.command_limit, self.over_current)
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class BridgeLandingParameters:
@@ -235,6 +240,12 @@ class BridgeParameters:
             raise ParameterError(
                 f"parameter 'fault.command_limit' is {self.fault.command_limit:g} A, it must be at "
                 f"least 'amplifier.continuous_current' ({self.amplifier.continuous_current:g} A)"
+            )
+        if self.landing.current > self.fault.largest_amplitude:
+            raise ParameterError(
+                f"parameter 'landing.current' is {self.landing.current:g} A, it must not exceed "
+                f"'fault.command_limit' ({self.fault.command_limit:g} A) or 'fault.over_current' "
+                f'({self.fault.over_current:g} A): a landing that asks for more is cut'
             )
         landing = self.landing
         longest = landing.braking_time + landing.descent_time + landing.settle_time
