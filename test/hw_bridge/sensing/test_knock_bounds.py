@@ -323,8 +323,9 @@ def test_the_push_goes_back_over_the_edge_it_passed_last() -> None:
             asked.under_way = False
 
 
-def test_nothing_is_asked_on_the_ground_or_with_no_current_left() -> None:
-    parameters = build(BridgeParameters, {})
+@pytest.mark.parametrize('limit', ['command_limit', 'over_current'])
+def test_nothing_is_asked_on_the_ground_or_with_no_current_left(limit: str) -> None:
+    parameters = build(BridgeParameters, {f'fault.{limit}': 6.0})
     asking, watched = knock.Knock(parameters), Hover().watched
     watched.silent[:] = 200
     assert asking.look(watched, False) is None
@@ -337,7 +338,7 @@ def test_nothing_is_asked_on_the_ground_or_with_no_current_left() -> None:
     asking.look(watched, True)
     pushed = asking.added(watched, i_d, i_q).copy()
     assert np.all(np.abs(pushed) > 0.01)
-    full = np.full(4, parameters.fault.command_limit)
+    full = np.full(4, 6.0)
     assert asking.added(watched, full, i_q) is i_q
     assert asking.added(watched, i_d, i_q) is i_q, 'it went on after it could not push'
 

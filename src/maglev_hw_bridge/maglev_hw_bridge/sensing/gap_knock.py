@@ -38,7 +38,7 @@ class GapKnock:
 
     def __init__(self, parameters: BridgeParameters) -> None:
         self._patience = round(parameters.fault.gap_silence / parameters.sample_time)
-        self._limit = parameters.fault.command_limit
+        self._limit = parameters.fault.largest_amplitude
         self._machine = machine_constants(parameters.machine)
         count = max(parameters.encoder.resolution[:4])
         self._pushes = Pushes(

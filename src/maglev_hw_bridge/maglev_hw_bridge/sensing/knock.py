@@ -113,7 +113,7 @@ class Knock:
         fault, period = parameters.fault, parameters.sample_time
         duration = samples_to_push(period)
         self._patience = round(fault.silence / period)
-        self._limit = fault.command_limit
+        self._limit = fault.largest_amplitude
         self._machine = machine_constants(parameters.machine)
         self._i_q = np.zeros(4)
         nearest = np.array([parameters.machine.gap_min, 0.0, 0.0, 0.0, 0.0])
