@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
+from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -44,12 +46,16 @@ def prove(
     angles: list[float],
     believed: list[float],
     aside: tuple[float, float] = (0.0, 0.0),
+    own: Mapping[str, object] = MappingProxyType({}),
     **given: object,
 ) -> list[str]:
-    """What is told of a machine with such electrical angles; its phases are pulsed."""
+    """What is told of a machine with such electrical angles; its phases are pulsed.
+
+    ``own``: of the machine alone, which the parameters do not tell.
+    """
     claimed = {name.replace('__', '.'): value for name, value in given.items()}
     claimed |= {'homing.x': 0.0, 'homing.z': 0.0, 'commutation.offset': believed}
-    true = {**claimed, **OTHER_MACHINE, 'emulation.wiring.angle': angles}
+    true = {**claimed, **OTHER_MACHINE, **own, 'emulation.wiring.angle': angles}
     parameters, boards = (
         build(BridgeParameters, claimed),
         EmulatedBoards(build(BridgeParameters, true)),
@@ -132,6 +138,16 @@ def test_a_wrong_sign_is_told_whatever_the_angles_are(index: int) -> None:
     sign = [-1 if i == index else 1 for i in range(12)]
     with pytest.raises(WrongError, match=rf'sign of element {index} of amplifier\.sign'):
         prove(ANYWHERE, ANYWHERE, amplifier__sign=sign)
+
+
+@pytest.mark.parametrize(('gap', 'horizontal'), [(1e-6, 1e-5), (1e-6, 1e-6), (2e-5, 5e-6)])
+def test_a_right_machine_passes_whatever_its_counts_are_worth(
+    gap: float, horizontal: float
+) -> None:
+    encoder = {'gap_resolution': gap, 'horizontal_resolution': horizontal}
+    own = {f'emulation.encoder.{name}': value for name, value in encoder.items()}
+    resolution = [gap] * 4 + [horizontal] * 2
+    assert WELL in prove([0.0] * 4, [0.0] * 4, own=own, encoder__resolution=resolution)
 
 
 def test_no_angle_is_named_for_what_it_does_not_explain() -> None:

@@ -163,7 +163,13 @@ class _Twin:
         )
         inject = dataclasses.replace(parameters.emulation.inject, sample=-1)
         emulation = dataclasses.replace(parameters.emulation, wiring=wiring, inject=inject)
-        twin = dataclasses.replace(parameters, emulation=emulation)
+        counts = emulation.encoder  # the rig's own, whatever those of the machine are worth
+        resolution = (counts.gap_resolution,) * 4 + (counts.horizontal_resolution,) * 2
+        twin = dataclasses.replace(
+            parameters,
+            emulation=emulation,
+            encoder=dataclasses.replace(encoder, resolution=resolution),
+        )
         self._rig = Rig(twin)
         self._rest = parameters.machine.gap_max
         driver = _RigDriver(self._rig)
