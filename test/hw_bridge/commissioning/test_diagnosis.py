@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from bridge_flight import HOME
@@ -51,6 +53,30 @@ def test_what_looks_alike_is_told_apart_where_it_does_not(foretold: np.ndarray) 
     both[:, [0, 6]] = both[:, [6, 0]]
     finding = diagnose(both[0], np.concatenate([alike, foretold], axis=3))
     assert finding.text.startswith('motor 1 phase a and motor 3 phase a are exchanged')
+
+
+@pytest.mark.parametrize(
+    ('dead', 'blind', 'text'),
+    [
+        ([0], [], 'motor 1 phase a moves nothing'),
+        ([], [3], 'encoder gap 4 sees nothing'),
+        ([], [0, 1, 2, 3], 'encoder gap 1 sees nothing'),  # phases a move no other encoder
+        ([], [4, 5], 'encoder x sees nothing'),
+        ([3, 4, 5, 9, 10, 11], [], 'motor 2 phase a moves nothing'),  # which x does not see, too
+        (range(12), [], 'no encoder sees any phase'),
+        ([], range(6), 'no encoder sees any phase'),
+    ],
+)
+def test_what_does_not_answer_is_named(
+    dead: Sequence[int], blind: Sequence[int], text: str, foretold: np.ndarray
+) -> None:
+    seen = foretold[0].copy()
+    seen[list(dead)] = 0.0
+    seen[..., list(blind)] *= 1e-3  # as for a resolution in other units
+    finding = diagnose(seen, foretold)
+    assert not finding.fine
+    assert finding.text.startswith(text)
+    assert ('encoder.resolution' in finding.text) == (len(blind) > 0 or len(dead) == 12)
 
 
 def test_pulses_are_small(foretold: np.ndarray) -> None:

@@ -72,19 +72,26 @@ def _shape(response: FloatArray) -> FloatArray:
 
 
 def _silent(seen: FloatArray, foretold: FloatArray) -> str:
-    answered = np.abs(seen) > _SEEN
+    """What does not answer at all; a phase is not blamed for what no phase has an encoder see."""
+    answered, expected = np.abs(seen) > _SEEN, np.abs(foretold) > _SEEN
+    sees = np.logical_or.reduce(answered, axis=(0, 1, 2))
+    if not sees.any():
+        return (
+            'no encoder sees any phase: check the supply, the cables of motors and encoders, and '
+            'encoder.resolution'
+        )
     for phase in range(PHASES):
-        if not answered[phase].any():
+        unseen = expected[phase][..., ~sees].any() and not expected[phase][..., sees].any()
+        if not answered[phase].any() and not unseen:
             return (
                 f'{PHASE_NAMES[phase]} moves nothing: check its amplifier, its cable, and element '
                 f'{phase} of amplifier.board and amplifier.channel'
             )
-    expected = np.abs(foretold) > _SEEN
     for encoder in range(ENCODERS):
-        if expected[..., encoder].any() and not answered[..., encoder].any():
+        if expected[..., encoder].any() and not sees[encoder]:
             return (
                 f'encoder {ENCODER_NAMES[encoder]} sees nothing: check its cable, and element '
-                f'{encoder} of encoder.board and encoder.channel'
+                f'{encoder} of encoder.board, encoder.channel and encoder.resolution'
             )
     return ''
 
