@@ -6,7 +6,8 @@ import re
 
 import numpy as np
 import pytest
-from made_up import Clock, refusing
+from bridge_flight import Flight, hover
+from made_up import LOWER_STOP, Clock, refusing
 from wired import bridge
 
 from maglev_hw_bridge.encoders import HomingError
@@ -40,6 +41,40 @@ def test_only_with_a_fault_that_homing_mends_the_platen_is_lifted(kind: str, hom
     assert stage.encoders.homed == homes
     assert stage.fault is latched  # until it is reset
     assert stage.mode is Mode.READY
+
+
+@pytest.mark.parametrize('when', ['in the landing', 'at rest', 'inactive'])
+def test_what_loses_counts_while_another_fault_is_latched_is_homed_after_its_reset(
+    when: str,
+) -> None:
+    flight = Flight(hover(0.025), {'boards.enable_output': 1})
+    flight.run(150)
+    flight.stage.stop()
+    if when == 'in the landing':
+        flight.run(100, controlled=False)
+        flight.boards.jumps[0] += 200
+    flight.until_no_current()
+    if when == 'at rest':
+        flight.boards.jumps[0] += 200
+        flight.run(3)
+    if when != 'inactive':
+        cleared, why = flight.stage.reset()
+        assert not cleared
+        assert why.endswith('encoder gap 1 lost counts: home again')
+    flight.stage.deactivate()
+    if when == 'inactive':
+        flight.boards.jumps[0] += 200
+        flight.boards.tick()
+    with pytest.raises(HomingError, match='a fault is latched: emergency stop'):
+        flight.stage.home()
+    assert flight.stage.reset()[0]
+    assert not flight.boards.lines.enabled
+    with pytest.raises(StageError, match='not homed'):
+        flight.stage.activate()
+    flight.stage.home()
+    flight.stage.activate()
+    assert flight.boards.lines.enabled
+    assert flight.stage.read().gap == pytest.approx([LOWER_STOP] * 4)
 
 
 def test_with_a_fault_latched_it_is_homed_by_word_all_the_same() -> None:

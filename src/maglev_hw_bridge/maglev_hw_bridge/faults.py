@@ -150,17 +150,11 @@ def then(first: Fault, second: Fault) -> Fault:
     )
 
 
-def remaining_cause(
-    parameters: BridgeParameters, stop_pressed: bool, watched: Guard, amplifier: Amplifiers
-) -> str:
-    """What still speaks against clearing a fault, or nothing."""
-    if stop_pressed:
-        return 'the emergency stop is pressed'
+def lost_counts(parameters: BridgeParameters, watched: Guard) -> str:
+    """Why the encoders do not tell any more where the platen is, or nothing."""
     if watched.failed:
         names = ', '.join(ENCODER_NAMES[i] for i in watched.failed)
         return f'encoder {names} lost counts: home again'
     if abs(watched.residual) > parameters.fault.residual:
         return f'g1 + g3 - g2 - g4 is {watched.residual * 1e6:.0f} um: home again'
-    if amplifier.load > parameters.amplifier.derate_load:
-        return f'the amplifiers are hot, I2t load {amplifier.load:.2f}: let them cool'
     return ''

@@ -341,14 +341,22 @@ class StageLife(abc.ABC):
         return True, f'cleared: {cleared.reason}'
 
     def _remaining(self) -> str:
-        """What still speaks against clearing a fault, or nothing."""
+        """What still speaks against clearing a fault, or nothing.
+
+        Encoders that lost their place while another fault was latched leave an inactive stage
+        unhomed in place of that: it is homed once that fault is cleared.
+        """
         try:
             against = self._speaks_against()
         except StageError as error:
             return str(error)
-        pressed = self.driver.stop_pressed
-        cause = faults.remaining_cause(self.parameters, pressed, self.guard, self.amplifiers)
-        return cause or against
+        lost = faults.lost_counts(self.parameters, self.guard)
+        beyond = self.encoders.homed and self.encoders.beyond_stops()
+        other = self.mode is Mode.READY and self.fault is not None and self.fault.kind != 'encoder'
+        if other and (lost or beyond):
+            self.encoders.homed, lost = False, ''
+            against = self._speaks_against()
+        return against if self.driver.stop_pressed else lost or against
 
     def _restart(self) -> str:
         """Bring lost boards back: opened, checked and, if active, started; what is wrong.
