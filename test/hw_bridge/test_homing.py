@@ -77,6 +77,19 @@ def test_what_loses_counts_while_another_fault_is_latched_is_homed_after_its_res
     assert flight.stage.read().gap == pytest.approx([LOWER_STOP] * 4)
 
 
+def test_no_platen_is_lifted_for_an_encoder_where_a_stop_since_was_not_reset() -> None:
+    stage, boards = bridge(homing__at_start=False, boards__enable_output=1)
+    stage.configure()
+    stage.fault = Fault('encoder', 'for a test', 'none', False)
+    stage.stop('by somebody else')
+    with pytest.raises(HomingError, match='stopped since the fault: by somebody else'):
+        stage.home()
+    assert boards.ticks == 0
+    assert 'by somebody else' in stage.reset()[1]
+    stage.home()
+    assert stage.reset() == (True, 'cleared: for a test')
+
+
 def test_with_a_fault_latched_it_is_homed_by_word_all_the_same() -> None:
     stage, _ = bridge(homing__at_start=False)
     stage.configure()

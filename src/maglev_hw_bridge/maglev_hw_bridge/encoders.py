@@ -16,6 +16,8 @@ from maglev_model.compiled.records import Block, Record
 CountArray = NDArray[np.int32]
 
 _HALF = 2**31
+_NEAR_ZERO = 2e-3  # counters that start anew are so near 0, though the platen was pushed [m]
+_ELSEWHERE = 1e-4  # farther from there than noise and a platen that settles [m]
 
 
 class HomingError(RuntimeError):
@@ -55,6 +57,7 @@ class Encoders:
         self._lower = np.array([fault.gap_lower] * 4 + [-machine.x_max, -machine.z_max])
         self._upper = np.array([fault.gap_upper] * 4 + [machine.x_max, machine.z_max])
         self._homing = parameters.homing
+        self._board = np.array(encoder.board)
         self._rest = machine.gap_max
         self.homed = False
         self.arrays = EncoderArrays(
@@ -117,6 +120,22 @@ class Encoders:
         self.homed = True
         self.start(readings[-1])
         return shift
+
+    def doubt_home(self, counts: CountArray) -> None:
+        """Be no longer homed if these ``counts`` (6,) of boards that came back have started anew.
+
+        Counters of a board that are near 0, and were elsewhere, have lost where they were. Near it,
+        for somebody may have moved the platen since the board had power again.
+        """
+        after, before = counts.astype(np.int64), self.arrays.total
+        resolution = np.abs(self.arrays.scale)
+        near = np.abs(after) * resolution < _NEAR_ZERO
+        moved = np.abs(after - before) * resolution > _ELSEWHERE
+        moved |= (after == 0) & (before != 0)
+        for board in set(self._board):
+            its = self._board == board
+            if near[its].all() and moved[its].any():
+                self.homed = False
 
     def _total_at(self, counts: CountArray) -> NDArray[np.int64]:
         step = counts.astype(np.int64) - self.arrays.last.astype(np.int64)

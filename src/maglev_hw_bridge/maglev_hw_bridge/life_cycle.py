@@ -28,9 +28,7 @@ from maglev_model.axes import FloatArray
 from maglev_model.contract.stage import STOPPED_SINCE, EncoderSample, Fault, StageError
 from maglev_model.parameters.plugins import describe_error
 
-_NEAR_ZERO = 2e-3  # counters that start anew are so near 0, though the platen was pushed [m]
 _BEFORE = np.array([[-(2**31)], [2**31 - 1]], np.int32)  # no encoder counts both, one after another
-_ELSEWHERE = 1e-4  # farther from there than noise and a platen that settles [m]
 
 
 class StageLife(abc.ABC):
@@ -158,6 +156,8 @@ class StageLife(abc.ABC):
         lifted = not vouched and self.parameters.homing.lift > 0.0
         if lifted and self.fault is not None and self.fault.kind != 'encoder':
             raise HomingError(f'a fault is latched: {self.fault}')
+        if lifted and self._stopped_since:
+            raise HomingError(STOPPED_SINCE.format(self._stopped_since))
         readings = np.zeros((self.parameters.homing.samples, 6), dtype=np.int32)
         for row in readings:
             self._peek(row)
@@ -363,10 +363,9 @@ class StageLife(abc.ABC):
 
         They stay lost where something is.
         """
-        total = self.encoders.arrays.total.copy()
         try:
             self._open()
-            self._forget_home_of_lost_counts(total)
+            self.encoders.doubt_home(self._counts)
             self.mode = Mode.READY
             wrong = self._speaks_against()
             if self._active and not wrong:
@@ -381,18 +380,3 @@ class StageLife(abc.ABC):
             self.driver.close()
             self._rest(Mode.LOST)
         return wrong
-
-    def _forget_home_of_lost_counts(self, before: NDArray[np.int64]) -> None:
-        """Counters of a board that came back near 0, and were elsewhere, have lost where they were.
-
-        Near it, for somebody may have moved the platen since the board had power again.
-        """
-        after = self._counts.astype(np.int64)
-        resolution = np.array(self.parameters.encoder.resolution)
-        near = np.abs(after) * resolution < _NEAR_ZERO
-        moved = np.abs(after - before) * resolution > _ELSEWHERE
-        moved |= (after == 0) & (before != 0)
-        for board in set(self.parameters.encoder.board):
-            its = np.array(self.parameters.encoder.board) == board
-            if near[its].all() and moved[its].any():
-                self.encoders.homed = False
