@@ -87,6 +87,27 @@ def test_load_and_fault_outlast_the_process(tmp_path: Path) -> None:
     third.close()
 
 
+@pytest.mark.parametrize('cut', [False, True])
+def test_a_stop_since_the_fault_outlasts_the_process(tmp_path: Path, *, cut: bool) -> None:
+    path = tmp_path / 'boards.json'
+    first = kept(path)
+    first.configure()
+    first.fault = Fault('range', 'for a test', 'none', cut)
+    first.stop('by somebody else')
+    first.close()
+    second = kept(path)
+    second.configure()
+    assert second.fault == Fault(
+        'stop', 'for a test; then by somebody else', 'none; see to that', cut
+    )
+    assert 'by somebody else' in cold(second).reset()[1]
+    second.close()
+    third = kept(path)
+    third.configure()
+    assert third.fault is None
+    third.close()
+
+
 def test_what_is_killed_in_flight_is_a_fault_and_hot(tmp_path: Path) -> None:
     path = tmp_path / 'boards.json'
     first = kept(path)

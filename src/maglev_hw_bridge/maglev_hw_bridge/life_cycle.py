@@ -140,9 +140,13 @@ class StageLife(abc.ABC):
             self.memory.release()
 
     def _keep(self) -> None:
-        """Remember load and fault; where that fails, what is remembered is worse."""
+        """Remember load and fault, a stop since too; where that fails, what is kept is worse."""
+        fault = self.fault
+        if fault is not None and self._stopped_since:
+            since = Fault('stop', self._stopped_since, 'see to that', fault.cut)
+            fault = faults.then(fault, since)
         with contextlib.suppress(StageError):
-            self.memory.keep(self.amplifiers.arrays.load, self.fault, active=False)
+            self.memory.keep(self.amplifiers.arrays.load, fault, active=False)
 
     def home(self, vouched: bool = False) -> FloatArray:
         """Define the encoders' zeros: the platen rests on its lower stop at its home position.
