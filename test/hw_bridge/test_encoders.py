@@ -143,6 +143,8 @@ def test_a_second_homing_elsewhere_is_refused() -> None:
         ('fault.command_limit', 1.0, 'at least'),
         ('fault.over_current', 1.5, r"'landing\.current' is 5 A.*'fault\.over_current' \(1\.5 A\)"),
         ('landing.current', 10.6, r"'landing\.current' is 10\.6 A, it must not exceed"),
+        ('landing.blind_descent_time', 4.8, r'stop_time.* is 5 s, a landing takes 5\.05 s'),
+        ('landing.adrift_descent_time', 60.0, r'stop_time.* is 5 s, a landing takes 60\.25 s'),
         ('homing.wrong', 1.0, 'no parameter'),
         ('emulation.encoder.gap_resolution', 5e-2, 'must lie in'),
     ],

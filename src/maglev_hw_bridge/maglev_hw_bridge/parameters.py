@@ -207,6 +207,12 @@ class BridgeLandingParameters:
     )
     current: float = parameter(5.0, 'largest current of a motor', unit='A', within=(0.1, 100.0))
 
+    @property
+    def longest(self) -> float:
+        """How long a landing may take, also one that an encoder does not see [s]."""
+        blind = self.blind_braking_time + max(self.blind_descent_time, self.adrift_descent_time)
+        return max(self.braking_time + self.descent_time, blind) + self.settle_time
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class BridgeParameters:
@@ -247,12 +253,10 @@ class BridgeParameters:
                 f"'fault.command_limit' ({self.fault.command_limit:g} A) or 'fault.over_current' "
                 f'({self.fault.over_current:g} A): a landing that asks for more is cut'
             )
-        landing = self.landing
-        longest = landing.braking_time + landing.descent_time + landing.settle_time
-        if self.boards.stop_time < longest:
+        if self.boards.stop_time < self.landing.longest:
             raise ParameterError(
                 f"parameter 'boards.stop_time' is {self.boards.stop_time:g} s, a landing takes "
-                f'{longest:g} s'
+                f'{self.landing.longest:g} s'
             )
 
     @property
