@@ -131,7 +131,8 @@ def test_what_is_killed_in_flight_is_a_fault_and_hot(tmp_path: Path) -> None:
     ['', '{', '[]', '{"active": false}', '{"active": false, "load": [1], "time": 0, "fault": null}',
      '{"active": false, "load": "hot", "time": 0, "fault": 3}', b'\xff\xfe',
      '{"active": false, "load": [NaN,0,0,0,0,0,0,0,0,0,0,0], "time": 0, "fault": null}',
-     '{"active": false, "load": [0,0,0,0,0,0,0,0,0,0,0,0], "time": NaN, "fault": null}'],
+     '{"active": false, "load": [0,0,0,0,0,0,0,0,0,0,0,0], "time": NaN, "fault": null}',
+     '{"active": false, "load": [0,0,0,0,0,0,0,0,0,0,0,0], "time": 1%s}' % ('0' * 400)],
 )  # fmt: skip
 def test_a_damaged_file_is_a_fault_and_hot(tmp_path: Path, content: str | bytes) -> None:
     path = tmp_path / 'boards.json'

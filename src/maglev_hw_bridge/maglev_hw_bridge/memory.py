@@ -113,7 +113,7 @@ class Memory:
             text = ''
         try:
             return self._understand(json.loads(text))
-        except (ValueError, TypeError, KeyError):
+        except (ValueError, TypeError, KeyError, OverflowError):
             reason = f"what '{self._path}' kept of the last run is damaged"
             return Kept(unknown, Fault('memory', reason, _SEE, True))
 
