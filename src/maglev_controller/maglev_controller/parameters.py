@@ -103,7 +103,7 @@ class RegulatorModelParameters(FundamentalParameters):
         1.0,
         'share of an error within a count of x or z that it learns from where the reference rests '
         '(fade); with less than all of it guides that stick hold the platen less at the edges of '
-        'counts, and without friction it drifts between them',
+        'counts, from which it is pushed back then, and without friction it drifts between them',
         within=(0.0, 1.0),
     )
     largest_error: tuple[float, ...] = parameter(

@@ -11,6 +11,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from maglev_controller.parameters import ControllerParameters
+from maglev_controller.step.rest import PUSH_TIME, SLIDES, STOOD, WEAKER
 from maglev_model.axes import FloatArray, X, Y, Z
 from maglev_model.parameters import build
 
@@ -30,7 +31,7 @@ def at_rest(**chosen: object) -> Bench:
     """After the second that its oscillators take to fade."""
     table = {'internal_model.within_count': WITHIN, **chosen}
     bench = Bench(build(ControllerParameters, table))
-    for _ in range(1000):
+    for _ in range(round(1.0 / bench.regulator.parameters.sample_time)):
         learns(bench)
     return bench
 
@@ -82,3 +83,87 @@ def test_by_default_with_the_papers_oscillators_and_without_counts_too(
     chosen: dict[str, object],
 ) -> None:
     assert learns(at_rest(**chosen), x=0.3 * COUNT)[X] == 0.3 * COUNT
+
+
+def over_the_edge(bench: Bench, beyond: float, back: float = 0.0, time: float = 0.005) -> float:
+    """What it learns in all, from x ``beyond`` for a ``time`` [s] and then ``back`` for 0.2 s,
+    after it has come back and beyond what it learns from where it is [m s]; counts."""
+    period = bench.regulator.parameters.sample_time
+    for _ in range(round(time / period)):
+        learns(bench, x=beyond * COUNT)
+    found = [learns(bench, x=back * COUNT)[X] for _ in range(round(0.2 / period))]
+    return float(period * np.sum(np.array(found) - found[-1]))
+
+
+@pytest.mark.parametrize('sample_time', [0.5e-3, 1e-3, 2e-3])
+@pytest.mark.parametrize(('beyond', 'back'), [(0.7, -0.3), (-0.9, 0.1), (1.4, 0.4)])
+def test_back_over_an_edge_it_learns_from_the_way_that_is_left(
+    sample_time: float, beyond: float, back: float
+) -> None:
+    way = np.copysign(min(abs(beyond) - 0.5, 0.5), beyond) * COUNT
+    learned = over_the_edge(at_rest(sample_time=sample_time), beyond, back)
+    assert learned == pytest.approx(PUSH_TIME * way, abs=0.51 * sample_time * abs(way))
+
+
+def test_not_on_the_way_back_from_farther_than_the_next_count(bench: Bench) -> None:
+    assert over_the_edge(bench, 1.6) == pytest.approx(0.0, abs=1e-15)
+
+
+def test_not_in_motion(bench: Bench) -> None:
+    for _ in range(300):
+        learns(bench, x=0.9 * COUNT, speed=0.01)
+    assert learns(bench, speed=0.01)[X] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_reading_that_flickers_comes_back_once(bench: Bench) -> None:
+    once = PUSH_TIME * 0.4 * COUNT
+    for _ in range(30):  # 60 ms
+        learns(bench, x=0.9 * COUNT)
+        learns(bench, x=-0.1 * COUNT)
+    assert over_the_edge(bench, 0.9, -0.1, time=0.001) == pytest.approx(0.0, abs=1e-15)
+    assert over_the_edge(bench, 0.9, -0.1) == pytest.approx(once, rel=1e-6)
+
+
+def test_who_is_pushed_over_the_other_edge_soon_is_pushed_less(bench: Bench) -> None:
+    def way(side: float) -> float:
+        return over_the_edge(bench, 0.7 * side) / (0.2 * COUNT * side)
+
+    assert way(1.0) == pytest.approx(PUSH_TIME, rel=1e-6)
+    assert way(-1.0) == pytest.approx(WEAKER * PUSH_TIME, rel=1e-6)
+    assert way(-1.0) == pytest.approx(WEAKER * PUSH_TIME, rel=1e-6)
+    for _ in range(600):  # then it was not pushed there, it drifted
+        learns(bench)
+    assert way(1.0) == pytest.approx(WEAKER * PUSH_TIME, rel=1e-6)
+    for _ in range(300):
+        learns(bench, speed=0.01)
+    for _ in range(600):
+        learns(bench)
+    assert way(1.0) == pytest.approx(PUSH_TIME, rel=1e-6)
+
+
+def virtual_inputs(bench: Bench, place: float, samples: int) -> list[float]:
+    """w of x at samples at which x is at a ``place`` [counts]."""
+    found = []
+    for _ in range(samples):
+        learns(bench, x=place * COUNT)
+        found.append(float(bench.regulator.arrays.sample['virtual_input'][X]))
+    return found
+
+
+def test_what_broke_loose_slides_on(bench: Bench) -> None:
+    *_, last = virtual_inputs(bench, 0.9, round(STOOD / 1e-3) + 5)
+    goes_on = round(0.4 * COUNT / SLIDES / 1e-3 + 0.5)
+    after = virtual_inputs(bench, -0.1, 3 * goes_on)
+    assert after[:goes_on] == [last] * goes_on
+    assert last not in after[goes_on:]
+
+
+def test_also_while_its_reading_flickers_but_not_when_it_is_elsewhere(bench: Bench) -> None:
+    *_, last = virtual_inputs(bench, 0.9, round(STOOD / 1e-3) + 5)
+    assert virtual_inputs(bench, -0.1, 2) + virtual_inputs(bench, 0.9, 2) == [last] * 4
+    assert last not in virtual_inputs(bench, 1.9, 1) + virtual_inputs(bench, -0.1, 5)
+
+
+def test_what_did_not_stick_does_not_slide_on(bench: Bench) -> None:
+    *_, last = virtual_inputs(bench, 0.9, round(STOOD / 1e-3) - 5)
+    assert last not in virtual_inputs(bench, -0.1, 5)

@@ -105,6 +105,14 @@ AXIS: Final = np.dtype(
         ('error', 'f8'),  # of the last sample, as w used it
         ('rested', 'f8'),  # how long the reference has been at rest [s]
         ('awake', 'f8'),  # 1 where the reference moves, 0 where it rests, and between them
+        ('last_read', 'f8'),  # error of the last reading
+        ('stood', 'f8'),  # how long the reading has not changed [s]
+        ('edge', 'f8'),  # over which the platen came back last, by sign; 0: none
+        ('returned', 'f8'),  # how long ago [s]
+        ('way', 'f8'),  # from there to where it should be
+        ('push_left', 'f8'),  # how much longer that is learned from [s]
+        ('too_far', 'i8'),  # how often that led over the other edge
+        ('goes_on', 'f8'),  # how much longer w stays as it is [s]
         ('surprise', 'f8'),  # what the encoders read beyond the prediction
         ('wanted_acceleration', 'f8'),  # of the reference with jumps made good
         ('bristle', 'f8'),  # friction's shape, -1 to 1, in the direction of motion

@@ -8,10 +8,18 @@ An integrator that learns from readings makes their mean right, which it is wher
 about the edge between two counts. Where one encoder tells of an axis and guides stick, it may learn
 less from an error within the count, which may be none, than from one beyond it: then the platen is
 read as the farther count for less of the time, and stays farther within the nearer one.
+
+Then an edge, when the platen comes back over it, tells how far it still has to go, which no reading
+tells on the way. Guides that give like springs want a force that is shifted in proportion, so the
+integrator learns from that way for a while. Guides that hold until they let go stop the platen as
+soon as w gives way, which the reading's leap makes it do: where it has stood before, w goes on as
+it is for as long as it slides that way. Guides that creep let it drift over the other edge soon
+after, and each time that happens less is learned, down to nothing.
 """
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 from maglev_controller.step.arrays import Record
@@ -25,6 +33,24 @@ REST: Final = 0.1
 
 FADING_TIME: Final = 0.05
 """Time constant of letting go and of waking up [s]."""
+
+PUSH_TIME: Final = 0.02
+"""For so long it learns from the way that is left when the platen comes back over an edge [s]."""
+
+STOOD: Final = 0.03
+"""A reading as old as that when the platen comes back is of one that stuck [s]."""
+
+SLIDES: Final = 7.5e-4
+"""About how fast one slides that has broken loose [m/s]."""
+
+APART: Final = 0.1
+"""What comes back sooner again is the same coming back, of a reading that flickers [s]."""
+
+SOON: Final = 0.5
+"""Within it the other edge is crossed because it was pushed too far [s]."""
+
+WEAKER: Final = 0.25
+"""Share of the way that is learned from after each time it was pushed too far."""
 
 
 @borrowing
@@ -52,7 +78,35 @@ def shares(settings: Record, axis: Record) -> tuple[float, float]:
 
 @borrowing
 def error_to_learn(settings: Record, axis: Record, index: int, error: float) -> float:
-    """What the internal model learns from in place of an error [m, rad]."""
-    if abs(error) > settings.half_horizontal:
+    """What the internal model learns from in place of an error [m, rad], of which it takes note."""
+    if settings.within_count[index] == 1.0:
         return error
-    return float(error * (1.0 - (1.0 - axis.awake) * (1.0 - settings.within_count[index])))
+    half, before, stood = settings.half_horizontal, axis.last_read, axis.stood
+    axis.last_read = error
+    axis.stood = 0.0 if abs(error - before) > half else stood + settings.period
+    axis.returned += settings.period
+    if axis.awake > 0.5:
+        axis.too_far, axis.edge, axis.push_left = 0, 0.0, 0.0
+    if abs(error) > half:
+        if abs(error) > 3.0 * half:
+            axis.goes_on = 0.0
+        return error
+    if half < abs(before) < 3.0 * half and axis.awake < 0.5 and axis.returned > APART:
+        _come_back(axis, math.copysign(min(abs(before) - half, half), before), stood)
+    learned = error * (1.0 - (1.0 - axis.awake) * (1.0 - settings.within_count[index]))
+    if axis.push_left > 0.0:
+        axis.push_left -= settings.period
+        learned += WEAKER**axis.too_far * axis.way
+    return float(learned)
+
+
+@borrowing
+def _come_back(axis: Record, way: float, stood: float) -> None:
+    """The platen has come back over an edge from where it ``stood`` so long, ``way`` from where
+    it should be [m], with the sign of its error."""
+    edge = math.copysign(1.0, way)
+    if edge == -axis.edge and axis.returned < SOON:
+        axis.too_far += 1
+    axis.edge, axis.returned, axis.way, axis.push_left = edge, 0.0, way, PUSH_TIME
+    if stood > STOOD:
+        axis.goes_on = WEAKER**axis.too_far * abs(way) / SLIDES

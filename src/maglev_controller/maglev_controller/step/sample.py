@@ -182,6 +182,9 @@ def _virtual_input(
     w = filtered + axis.bump
     sample.error[index] = measured - position
     sample.error_rate[index] = error_rate
+    if axis.goes_on > 0.0:
+        axis.goes_on -= settings.period
+        return
     ahead = to_acceleration + settings.feed_forward * acceleration
     sample.virtual_input[index] = w + ahead + friction_ahead(settings, axis, index)
     if settings.learns:
