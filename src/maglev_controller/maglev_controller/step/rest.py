@@ -102,8 +102,10 @@ def error_to_learn(settings: Record, axis: Record, index: int, error: float) -> 
 
 @borrowing
 def _come_back(axis: Record, way: float, stood: float) -> None:
-    """The platen has come back over an edge from where it ``stood`` so long, ``way`` from where
-    it should be [m], with the sign of its error."""
+    """The platen is back over an edge, from where it has ``stood`` [s], on its ``way`` [m].
+
+    That is how far it has to go, at most to the middle of the count, with the sign of its error.
+    """
     edge = math.copysign(1.0, way)
     if edge == -axis.edge and axis.returned < SOON:
         axis.too_far += 1
