@@ -337,6 +337,7 @@ def _settings(
             parameters.internal_model.within_count if design.fades and axis in ('x', 'z') else 1.0
             for axis, design in zip(AXES, designs, strict=True)
         ],
+        'slide_speed': (0.0, *parameters.internal_model.slide_speed, 0.0, 0.0),
         'learned_error': np.where(limited, parameters.internal_model.largest_error, math.inf),
         'filter_gain': filters[:, 0],
         'filter_forget': filters[:, 1],

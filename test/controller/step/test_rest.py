@@ -11,11 +11,12 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from maglev_controller.parameters import ControllerParameters
-from maglev_controller.step.rest import PUSH_TIME, SLIDES, STOOD, WEAKER
+from maglev_controller.step.rest import PUSH_TIME, STOOD, WEAKER
 from maglev_model.axes import FloatArray, X, Y, Z
 from maglev_model.parameters import build
 
 COUNT, WITHIN = 1e-5, 0.05
+SLIDES = 7.5e-4  # [m/s]
 
 
 def learns(
@@ -29,7 +30,11 @@ def learns(
 
 def at_rest(**chosen: object) -> Bench:
     """After the second that its oscillators take to fade."""
-    table = {'internal_model.within_count': WITHIN, **chosen}
+    table = {
+        'internal_model.within_count': WITHIN,
+        'internal_model.slide_speed': (SLIDES, 0.0),
+        **chosen,
+    }
     bench = Bench(build(ControllerParameters, table))
     for _ in range(round(1.0 / bench.regulator.parameters.sample_time)):
         learns(bench)
@@ -107,6 +112,11 @@ def test_back_over_an_edge_it_learns_from_the_way_that_is_left(
 
 def test_not_on_the_way_back_from_farther_than_the_next_count(bench: Bench) -> None:
     assert over_the_edge(bench, 1.6) == pytest.approx(0.0, abs=1e-15)
+
+
+def test_not_by_default() -> None:
+    bench = at_rest(**{'internal_model.slide_speed': (0.0, SLIDES)})
+    assert over_the_edge(bench, 0.9) == pytest.approx(0.0, abs=1e-15)
 
 
 def test_not_in_motion(bench: Bench) -> None:

@@ -9,12 +9,13 @@ about the edge between two counts. Where one encoder tells of an axis and guides
 less from an error within the count, which may be none, than from one beyond it: then the platen is
 read as the farther count for less of the time, and stays farther within the nearer one.
 
-Then an edge, when the platen comes back over it, tells how far it still has to go, which no reading
-tells on the way. Guides that give like springs want a force that is shifted in proportion, so the
-integrator learns from that way for a while. Guides that hold until they let go stop the platen as
-soon as w gives way, which the reading's leap makes it do: where it has stood before, w goes on as
-it is for as long as it slides that way. Guides that creep let it drift over the other edge soon
-after, and each time that happens less is learned, down to nothing.
+Then an edge, when the platen comes back over it, also tells how far it still has to go, which no
+reading tells on the way. Guides that give like springs want a force that is shifted in proportion,
+so the integrator learns from that way for a while. Guides that hold until they let go stop the
+platen as soon as w gives way, which the reading's leap makes it do: where it has stood before, w
+goes on as it is for as long as it slides that way. Guides that creep let it drift over the other
+edge soon after, and each time that happens less is learned, down to nothing. How fast an axis
+slides is known of the machine; one that is not told is not pushed on.
 """
 
 from __future__ import annotations
@@ -39,9 +40,6 @@ PUSH_TIME: Final = 0.02
 
 STOOD: Final = 0.03
 """A reading as old as that when the platen comes back is of one that stuck [s]."""
-
-SLIDES: Final = 7.5e-4
-"""About how fast one slides that has broken loose [m/s]."""
 
 APART: Final = 0.1
 """What comes back sooner again is the same coming back, of a reading that flickers [s]."""
@@ -91,8 +89,10 @@ def error_to_learn(settings: Record, axis: Record, index: int, error: float) -> 
         if abs(error) > 3.0 * half:
             axis.goes_on = 0.0
         return error
-    if half < abs(before) < 3.0 * half and axis.awake < 0.5 and axis.returned > APART:
-        _come_back(axis, math.copysign(min(abs(before) - half, half), before), stood)
+    slides = settings.slide_speed[index]
+    returns = half < abs(before) < 3.0 * half and axis.awake < 0.5 and axis.returned > APART
+    if slides > 0.0 and returns:
+        _come_back(axis, math.copysign(min(abs(before) - half, half), before), stood, slides)
     learned = error * (1.0 - (1.0 - axis.awake) * (1.0 - settings.within_count[index]))
     if axis.push_left > 0.0:
         axis.push_left -= settings.period
@@ -101,14 +101,15 @@ def error_to_learn(settings: Record, axis: Record, index: int, error: float) -> 
 
 
 @borrowing
-def _come_back(axis: Record, way: float, stood: float) -> None:
+def _come_back(axis: Record, way: float, stood: float, slides: float) -> None:
     """The platen is back over an edge, from where it has ``stood`` [s], on its ``way`` [m].
 
     That is how far it has to go, at most to the middle of the count, with the sign of its error.
+    ``slides`` is the speed of one that has broken loose [m/s].
     """
     edge = math.copysign(1.0, way)
     if edge == -axis.edge and axis.returned < SOON:
         axis.too_far += 1
     axis.edge, axis.returned, axis.way, axis.push_left = edge, 0.0, way, PUSH_TIME
     if stood > STOOD:
-        axis.goes_on = WEAKER**axis.too_far * abs(way) / SLIDES
+        axis.goes_on = WEAKER**axis.too_far * abs(way) / slides
