@@ -24,7 +24,7 @@ from maglev_controller.design.margins import LoopMargins, all_margins, check_mar
 from maglev_controller.design.observer import NO_OBSERVER
 from maglev_controller.foreign_law import ForeignLaw, Law
 from maglev_controller.laws import control_law, find_law
-from maglev_controller.parameters import ControllerParameters
+from maglev_controller.parameters import ControllerParameters, RegulatorModelParameters
 from maglev_controller.stage_parameters import EncoderParameters, FrictionParameters
 from maglev_controller.step.arrays import (
     AXIS,
@@ -333,11 +333,7 @@ def _settings(
         'error_gain': gains[:, 0],
         'rate_gain': gains[:, 1],
         'error_limit': np.where(limited, limits.error, math.inf),
-        'within_count': [
-            parameters.internal_model.within_count if design.fades and axis in ('x', 'z') else 1.0
-            for axis, design in zip(AXES, designs, strict=True)
-        ],
-        'slide_speed': (0.0, *parameters.internal_model.slide_speed, 0.0, 0.0),
+        **_within_counts(parameters.internal_model, designs),
         'learned_error': np.where(limited, parameters.internal_model.largest_error, math.inf),
         'filter_gain': filters[:, 0],
         'filter_forget': filters[:, 1],
@@ -353,6 +349,16 @@ def _settings(
         **_counts(parameters.encoder),
         **_friction(parameters.friction, parameters.sample_time),
     }
+
+
+def _within_counts(
+    model: RegulatorModelParameters, designs: Sequence[AxisDesign]
+) -> dict[str, ArrayLike]:
+    """What axes do within a count at rest: x and z, of which one encoder tells."""
+    fades = np.array([design.fades for design in designs])
+    share = np.where(fades, (1.0, model.within_count, model.within_count, 1.0, 1.0), 1.0)
+    slides = (0.0, *model.slide_speed, 0.0, 0.0)
+    return {'within_count': share, 'slide_speed': np.where(share < 1.0, slides, 0.0)}
 
 
 def _counts(encoder: EncoderParameters) -> dict[str, ArrayLike]:

@@ -76,9 +76,18 @@ def shares(settings: Record, axis: Record) -> tuple[float, float]:
 
 @borrowing
 def error_to_learn(settings: Record, axis: Record, index: int, error: float) -> float:
-    """What the internal model learns from in place of an error [m, rad], of which it takes note."""
-    if settings.within_count[index] == 1.0:
+    """What the internal model learns from in place of an error [m, rad]."""
+    slides = settings.slide_speed[index]
+    pushed = _pushed(settings, axis, slides, error) if slides > 0.0 else 0.0
+    if abs(error) > settings.half_horizontal:
         return error
+    learned = error * (1.0 - (1.0 - axis.awake) * (1.0 - settings.within_count[index]))
+    return float(learned + pushed)
+
+
+@borrowing
+def _pushed(settings: Record, axis: Record, slides: float, error: float) -> float:
+    """What is learned from besides [m], after an edge that was crossed; takes note of the error."""
     half, before, stood = settings.half_horizontal, axis.last_read, axis.stood
     axis.last_read = error
     axis.stood = 0.0 if abs(error - before) > half else stood + settings.period
@@ -88,16 +97,13 @@ def error_to_learn(settings: Record, axis: Record, index: int, error: float) -> 
     if abs(error) > half:
         if abs(error) > 3.0 * half:
             axis.goes_on = 0.0
-        return error
-    slides = settings.slide_speed[index]
-    returns = half < abs(before) < 3.0 * half and axis.awake < 0.5 and axis.returned > APART
-    if slides > 0.0 and returns:
+        return 0.0
+    if half < abs(before) < 3.0 * half and axis.awake < 0.5 and axis.returned > APART:
         _come_back(axis, math.copysign(min(abs(before) - half, half), before), stood, slides)
-    learned = error * (1.0 - (1.0 - axis.awake) * (1.0 - settings.within_count[index]))
-    if axis.push_left > 0.0:
-        axis.push_left -= settings.period
-        learned += WEAKER**axis.too_far * axis.way
-    return float(learned)
+    if axis.push_left <= 0.0:
+        return 0.0
+    axis.push_left -= settings.period
+    return float(WEAKER**axis.too_far * axis.way)
 
 
 @borrowing
