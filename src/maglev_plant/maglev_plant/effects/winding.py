@@ -26,7 +26,7 @@ import numpy as np
 
 from maglev_model.axes import FloatArray
 from maglev_model.commutation import direct_quadrature_currents, phase_currents
-from maglev_model.compiled import borrowing, compiled
+from maglev_model.compiled import borrowing
 from maglev_model.compiled.arrays import copy_to
 from maglev_model.compiled.records import Record
 from maglev_model.machine import Machine
@@ -60,6 +60,7 @@ class WindingArrays(Record):
     slope: Annotated[FloatArray, INTERVALS + 1]  # [H/m]
     phase: Annotated[FloatArray, 12]  # flowing [A]
     last: Annotated[FloatArray, 10]  # state when the last step began
+    middle: Annotated[FloatArray, 10]  # state in the middle of the step that has begun
     limited: bool  # whether the rail limited a phase in this sample
 
 
@@ -164,16 +165,16 @@ def _flow(
     return flowing, 0.5 * (current + flowing)
 
 
-@compiled
-def _middle(winding: WindingArrays, state: FloatArray, step: float) -> FloatArray:
+@borrowing
+def _find_middle(winding: WindingArrays, state: FloatArray, step: float) -> None:
     """The state in the middle of the step that begins, by the speeds' change in the last one."""
-    middle: FloatArray = state.copy()
+    middle = winding.middle
+    copy_to(state, middle)
     for axis in range(5):
         speed = 2 * axis + 1
         middle[speed] += 0.5 * (state[speed] - winding.last[speed])
         middle[speed - 1] += 0.25 * step * (state[speed] + middle[speed])
     copy_to(state, winding.last)
-    return middle
 
 
 @borrowing
@@ -190,7 +191,8 @@ def carry_currents(
 
     Written: ``mean`` (8,), i_d and i_q in the middle of the step, by which the forces go.
     """
-    middle = _middle(winding, state, step)
+    _find_middle(winding, state, step)
+    middle = winding.middle
     for motor in range(motors.first, motors.last):
         gap, gap_rate = motor_gap(motors, motor, middle)
         along, _ = along_across(motors, motor, middle[2], middle[4])
