@@ -103,14 +103,15 @@ class RegulatorModelParameters(FundamentalParameters):
         1.0,
         'share of an error within a count of x or z that it learns from where the reference rests '
         '(fade); with less than all of it guides that stick hold the platen less at the edges of '
-        'counts, and without friction it drifts between them',
+        'counts, and without friction it drifts between them; and with less it learns at their '
+        'edges, too: of the way that is left to one that comes back over one',
         within=(0.0, 1.0),
     )
     slide_speed: tuple[float, ...] = parameter(
         (0.0, 0.0),
-        'about how fast a platen slides along x and z that has broken loose; above 0 one that '
-        'comes back over the edge of a count is pushed on by the way that is left, where '
-        'within_count is below 1',
+        'about how fast a platen slides along x and z that has broken loose; above 0, where '
+        'within_count is below 1, one that stuck and comes back over the edge of a count is let '
+        'slide on by the way that is left',
         unit='m/s',
         within=(0.0, 1.0),
         length=2,

@@ -357,8 +357,7 @@ def _within_counts(
     """What axes do within a count at rest: x and z, of which one encoder tells."""
     fades = np.array([design.fades for design in designs])
     share = np.where(fades, (1.0, model.within_count, model.within_count, 1.0, 1.0), 1.0)
-    slides = (0.0, *model.slide_speed, 0.0, 0.0)
-    return {'within_count': share, 'slide_speed': np.where(share < 1.0, slides, 0.0)}
+    return {'within_count': share, 'slide_speed': (0.0, *model.slide_speed, 0.0, 0.0)}
 
 
 def _counts(encoder: EncoderParameters) -> dict[str, ArrayLike]:

@@ -115,8 +115,13 @@ def test_not_on_the_way_back_from_farther_than_the_next_count(bench: Bench) -> N
 
 
 def test_not_by_default() -> None:
-    bench = at_rest(**{'internal_model.slide_speed': (0.0, SLIDES)})
+    bench = at_rest(**{'internal_model.within_count': 1.0})
     assert over_the_edge(bench, 0.9) == pytest.approx(0.0, abs=1e-15)
+
+
+def test_also_where_nobody_tells_how_fast_it_slides() -> None:
+    bench = at_rest(**{'internal_model.slide_speed': (0.0, SLIDES)})
+    assert over_the_edge(bench, 0.9) == pytest.approx(PUSH_TIME * 0.4 * COUNT, rel=1e-6)
 
 
 def test_not_in_motion(bench: Bench) -> None:
@@ -172,6 +177,12 @@ def test_also_while_its_reading_flickers_but_not_when_it_is_elsewhere(bench: Ben
     *_, last = virtual_inputs(bench, 0.9, round(STOOD / 1e-3) + 5)
     assert virtual_inputs(bench, -0.1, 2) + virtual_inputs(bench, 0.9, 2) == [last] * 4
     assert last not in virtual_inputs(bench, 1.9, 1) + virtual_inputs(bench, -0.1, 5)
+
+
+def test_without_a_speed_nothing_slides_on() -> None:
+    bench = at_rest(**{'internal_model.slide_speed': (0.0, SLIDES)})
+    *_, last = virtual_inputs(bench, 0.9, round(STOOD / 1e-3) + 5)
+    assert last not in virtual_inputs(bench, -0.1, 5)
 
 
 def test_what_did_not_stick_does_not_slide_on(bench: Bench) -> None:

@@ -72,7 +72,7 @@ SETTINGS: Final = np.dtype(
         ('half_gap', 'f8'),  # half a count of the gaps' encoders [m]
         ('half_horizontal', 'f8'),  # of those of x and z
         ('within_count', 'f8', 5),  # share of an error within that that is learned from at rest
-        ('slide_speed', 'f8', 5),  # of what has broken loose, 0: it is not pushed on [m/s]
+        ('slide_speed', 'f8', 5),  # of what has broken loose, 0: it does not slide on [m/s]
         ('floored', '?'),  # whether counts are rounded down
         ('notches', 'i8', 5),  # how many
         ('notch', 'f8', (5, MOST, 5)),  # their coefficients, as of Notch

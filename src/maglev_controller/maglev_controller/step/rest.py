@@ -13,9 +13,9 @@ Then an edge, when the platen comes back over it, also tells how far it still ha
 reading tells on the way. Guides that give like springs want a force that is shifted in proportion,
 so the integrator learns from that way for a while. Guides that hold until they let go stop the
 platen as soon as w gives way, which the reading's leap makes it do: where it has stood before, w
-goes on as it is for as long as it slides that way. Guides that creep let it drift over the other
-edge soon after, and each time that happens less is learned, down to nothing. How fast an axis
-slides is known of the machine; one that is not told is not pushed on.
+goes on as it is for as long as it slides that way, on an axis that is told how fast that is. Guides
+that creep let it drift over the other edge soon after, and each time that happens less is learned,
+down to nothing.
 """
 
 from __future__ import annotations
@@ -77,12 +77,13 @@ def shares(settings: Record, axis: Record) -> tuple[float, float]:
 @borrowing
 def error_to_learn(settings: Record, axis: Record, index: int, error: float) -> float:
     """What the internal model learns from in place of an error [m, rad]."""
-    slides = settings.slide_speed[index]
-    pushed = _pushed(settings, axis, slides, error) if slides > 0.0 else 0.0
+    share = settings.within_count[index]
+    if share == 1.0:
+        return error
+    pushed = _pushed(settings, axis, settings.slide_speed[index], error)
     if abs(error) > settings.half_horizontal:
         return error
-    learned = error * (1.0 - (1.0 - axis.awake) * (1.0 - settings.within_count[index]))
-    return float(learned + pushed)
+    return float(error * (1.0 - (1.0 - axis.awake) * (1.0 - share)) + pushed)
 
 
 @borrowing
@@ -111,11 +112,11 @@ def _come_back(axis: Record, way: float, stood: float, slides: float) -> None:
     """The platen is back over an edge, from where it has ``stood`` [s], on its ``way`` [m].
 
     That is how far it has to go, at most to the middle of the count, with the sign of its error.
-    ``slides`` is the speed of one that has broken loose [m/s].
+    ``slides`` is the speed of one that has broken loose, 0 where it is not known [m/s].
     """
     edge = math.copysign(1.0, way)
     if edge == -axis.edge and axis.returned < SOON:
         axis.too_far += 1
     axis.edge, axis.returned, axis.way, axis.push_left = edge, 0.0, way, PUSH_TIME
-    if stood > STOOD:
+    if slides > 0.0 and stood > STOOD:
         axis.goes_on = WEAKER**axis.too_far * abs(way) / slides
