@@ -58,6 +58,21 @@ def test_latency_holds_back_what_the_boards_put_out() -> None:
     assert rig.phase_current == pytest.approx(np.ones(12), rel=1e-4)
 
 
+def test_a_turned_motor_counts_its_electrical_angle_along_itself() -> None:
+    """As one whose commutation is off by what its other axis moves along it, rail or not."""
+    missed = np.pi / M.tau * 0.03 * np.sin(0.1)
+    place = {'emulation__initial__position': (0.025, 0.0, 0.03, 0.0, 0.0)}
+    for voltage in (0.0, 48.0):
+        found = []
+        for name, value in (('angle', 0.1), ('commutation', missed)):
+            motor = {f'effects__motor__{name}': (0.0, value, 0.0, 0.0)}
+            rig = _rig(**motor, **place, effects__winding__voltage=voltage)
+            rig.advance(np.tile([1.0, -0.5, -0.5], 4))
+            found.append(rig.stage.command.copy())
+        assert found[0] == pytest.approx(found[1], abs=1e-12)
+        assert abs(found[0][5] - found[0][7]) > 0.05
+
+
 def test_the_rough_machine_flies_on_the_bridge() -> None:
     rough = from_yaml(BridgeParameters, 'hw_bridge', PARAMS / 'rough.yaml')
     given = {k: v for k, v in values(rough).items() if k.startswith(('effects.', 'emulation.'))}

@@ -149,6 +149,24 @@ def test_strength_place_and_commutation_of_each_motor_act_as_printed(motor: int)
     assert found[tilt] == pytest.approx(torque / 0.5268, rel=1e-3)
 
 
+def test_a_turned_motor_counts_its_electrical_angle_along_itself() -> None:
+    """Aside, it is displaced along itself as well, of which the commutation does not know."""
+    turned, aside, locked = 0.1, 0.03, {'guide__locked': (True,) * 5}
+    place = {'initial__position': (0.025, 0.01, aside, 0.0, 0.0), **locked}
+    along = 0.01 * math.cos(turned) + aside * math.sin(turned)
+    missed = math.pi / M.tau * (along - 0.01)
+    assert missed > 0.1
+    found = []
+    for name, value in (('angle', turned), ('commutation', missed)):
+        stage = ideal_stage(**{f'effects__motor__{name}': (0.0, value, 0.0, 0.0)}, **place)
+        stage.write(np.full(4, 0.8), np.full(4, 0.6))
+        states(stage, 5)
+        found.append([*stage.direct_current, *stage.quadrature_current])
+    assert found[0] == pytest.approx(found[1], abs=1e-12)
+    assert found[0][1] == pytest.approx(0.8 * math.cos(missed) + 0.6 * math.sin(missed), rel=1e-6)
+    assert found[0][0] == pytest.approx(0.8, rel=1e-6)
+
+
 def test_spread_is_drawn_by_the_seed() -> None:
     drawn = [
         ideal_stage(seed=seed, effects__motor__spread=0.03).arrays.effects.motors

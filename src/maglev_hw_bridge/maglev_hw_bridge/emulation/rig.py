@@ -26,6 +26,7 @@ from maglev_model.parameters import ParameterError
 from maglev_plant.arrays import StageArrays, stage_arrays
 from maglev_plant.dynamics import advance
 from maglev_plant.effects.drive import aim, command_phases
+from maglev_plant.effects.motors import along_across
 from maglev_plant.effects.parameters import DriveParameters
 from maglev_plant.effects.winding import carry_currents, set_current_loop
 from maglev_plant.encoder import encode
@@ -75,8 +76,8 @@ def _flow(rig: RigArrays, targets: FloatArray) -> None:
 def _commute(rig: RigArrays, stage: StageArrays, before: FloatArray) -> None:
     """i_d and i_q of a step, from the mean of the phase currents before and after it."""
     for motor in range(4):
-        displacement = stage.state[4] if motor % 2 == 0 else stage.state[2]
-        angle = rig.angle[motor] + rig.wave * displacement
+        along, _ = along_across(stage.effects.motors, motor, stage.state[2], stage.state[4])
+        angle = rig.angle[motor] + rig.wave * along
         k = 3 * motor
         i_d, i_q = direct_quadrature_currents(
             0.5 * (before[k] + rig.current[k]),

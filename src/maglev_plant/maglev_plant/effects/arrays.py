@@ -62,7 +62,7 @@ def effect_arrays(parameters: PlantParameters, machine: Machine, step: float) ->
         )
         or effects.drive != _OFF.drive
         or effects.winding.voltage > 0.0,
-        by_phases=any(effects.motor.commutation)
+        by_phases=any((*effects.motor.commutation, *effects.motor.angle))
         or effects.drive != _OFF.drive
         or effects.winding.voltage > 0.0,
         friction=friction_arrays(parameters, balance.mass, motor_places(parameters)),
