@@ -80,6 +80,23 @@ def test_a_sensor_of_ones_own(module: str) -> None:
     assert np.allclose(sample.gap, 0.025)
 
 
+@pytest.mark.parametrize('rounding', ['nearest', 'floor'])
+def test_a_sensor_of_ones_own_has_no_zero_within_a_count(rounding: str, module: str) -> None:
+    """It takes the place of the counts, so where they would begin is nowhere."""
+    stage = ideal_stage(
+        initial__position=(0.025, 3e-6, 0.0, 0.0, 0.0),
+        encoder__gap_resolution=10e-6,
+        encoder__horizontal_resolution=10e-6,
+        effects__sensor__model=module,
+        effects__sensor__rounding=rounding,
+        effects__sensor__phase=(0.3,) * 6,
+        effects__sensor__random_phase=True,
+    )
+    sample = stage.read()
+    own = stage.truth().own_length
+    assert list(own) == [*sample.gap, sample.x, sample.z]
+
+
 @pytest.mark.parametrize('group', ['friction', 'motor', 'sensor'])
 def test_what_is_no_model_is_refused_by_its_name(group: str, module: str) -> None:
     where = rf'effects\.{group}\.model'

@@ -5,12 +5,12 @@ the stage's own code is compiled once, whatever model it meets. The functions, p
 Numba compiles:
 
 - ``force(velocity, level, step, memory)``: friction [N, N m] that resists in the next ``step`` [s],
-  of a guide that slides at ``velocity`` with the level F(v) there. ``memory``, four floats that
-  begin with 0, is the guide's own.
+  of a guide that slides at ``velocity`` with the level F(v) there; not asked for where the level
+  is 0. ``memory``, four floats that begin with 0, is the guide's own.
 - ``forces(gap, i_d, i_q, out)``: F_V and F_H of a motor [N] into ``out`` (2,), as (1), (2) have
   them: F_V positive where it widens the gap.
 - ``reading(length, channel, sample, memory)``: what encoder ``channel`` (0..5) reads of a length
-  [m]; ``memory`` as above.
+  [m], in place of the counts; ``memory`` as above.
 
 Each is tried once, at rest at 25 mm. What raises in flight, as an index out of bounds does, gives
 NaN, which no flight goes on with.

@@ -105,11 +105,15 @@ def _on_scale(sensor: SensorArrays, i: int, length: float) -> float:
 
 @borrowing
 def note_own(sensor: SensorArrays, lengths: FloatArray) -> None:
-    """Keep what true ``lengths`` (6,) [m] are on the encoders' own scales, between the counts."""
+    """Keep what true ``lengths`` (6,) [m] are on the encoders' own scales, between the counts.
+
+    What a foreign model takes in place of the counts has no zero within one.
+    """
     half = -0.5 if sensor.floor else 0.0
     for i in range(6):
-        shift = (sensor.phase[i] + half) * sensor.resolution[i]
-        sensor.own[i] = _on_scale(sensor, i, lengths[i]) + shift
+        sensor.own[i] = _on_scale(sensor, i, lengths[i])
+        if sensor.address == 0:
+            sensor.own[i] += (sensor.phase[i] + half) * sensor.resolution[i]
 
 
 @borrowing
