@@ -16,7 +16,7 @@ from bokeh.resources import Resources
 from made_up_run import TOPICS, open_bag, write_samples
 
 from maglev_model.parameters import DIFFERS, ParameterError, build
-from maglev_monitor.bag.analysis import analyse
+from maglev_monitor.bag.analysis import UNTOLD, analyse
 from maglev_monitor.bag.export_cli import DONE, export
 from maglev_monitor.metrics.decoding import decode
 from maglev_monitor.metrics.joiner import Joiner
@@ -153,6 +153,18 @@ def test_a_cut_off_bag_is_reported_and_says_so(bag: Path, tmp_path: Path, capsys
     captured = capsys.readouterr()
     assert 'recovered' in captured.err
     assert len(captured.err.splitlines()) == 1
+
+
+@pytest.mark.usefixtures('no_plots')
+def test_a_whole_bag_without_a_monitor_says_that_no_limits_are_known(
+    tmp_path: Path, run: Any, messages: dict[str, list[bytes]], capsys: Any
+) -> None:
+    writer = open_bag(tmp_path / 'bag')
+    write_samples(writer, run, messages)
+    writer.close()
+    assert analyze([str(tmp_path / 'bag')]) == PASS
+    assert capsys.readouterr().err == f'analyze: {UNTOLD}\n'
+    assert f'<li>{UNTOLD}</li>' in (tmp_path / 'report.html').read_text(encoding='utf-8')
 
 
 def test_no_bag_is_one_clear_line(tmp_path: Path, capsys: Any) -> None:

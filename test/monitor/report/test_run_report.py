@@ -13,7 +13,8 @@ from made_up_run import TOPICS, Encoder, open_bag, write_samples
 
 from maglev_model.contract.phases import Phase
 from maglev_monitor.bag.analysis import analyse
-from maglev_monitor.report import run_report
+from maglev_monitor.report import run_report, tables
+from maglev_monitor.report.terminal import as_text
 
 
 @pytest.mark.parametrize(
@@ -63,3 +64,16 @@ def test_another_flight_in_the_bag_is_said(
     said = f"'two' goes on with another flight, from sample {again} on: not counted"
     assert [note for note in two.notes if 'flight' in note] == [said]
     assert said not in one.notes
+
+
+def test_the_figures_of_iso_230_2_say_of_how_many_approaches_they_are(bag: Path) -> None:
+    analysis = analyse(bag)
+    found = dict.fromkeys(tables.REPEATABILITY, 1e-06) | {'targets': 4, 'approaches': 3}
+    told = {**analysis.result, 'repeatability': {'own': {'x': found}}}
+    page = html.unescape(run_report.render(dataclasses.replace(analysis, result=told)))
+    assert '<th>targets</th><th>approaches</th>' in page
+    assert '<td>4</td><td>3</td>' in page
+    text = as_text(told).splitlines()
+    heads = next(line for line in text if 'ISO 230-2' in line)
+    assert heads.split()[-2:] == ['targets', 'approaches']
+    assert text[text.index(heads) + 1].split()[-2:] == ['4', '3']

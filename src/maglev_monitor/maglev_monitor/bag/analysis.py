@@ -26,6 +26,12 @@ from maglev_monitor.metrics.run_parameters import (
     run_from_json,
 )
 
+UNTOLD = (
+    'no monitor speaks in the bag, on diagnostics: machine and limits of the run are not known, the'
+    ' default machine stands in, and of limits missing samples alone are checked'
+)
+"""The note on a bag without parameters of its run, which may be whole all the same."""
+
 _NO_NEWS = ('effective_parameters:', 'command:')
 """Parameters that are said elsewhere, or say nothing of a run."""
 
@@ -110,9 +116,9 @@ def _changes(folder: Path) -> list[tuple[str, str]]:
 def run_parameters(bag: Bag) -> tuple[RunParameters, list[str]]:
     """The parameters the monitor left in the bag; without a monitor the defaults.
 
-    The sample time then is the stage's. A note says so where they cannot be read.
+    The sample time then is the stage's. A note says so, and where they cannot be read.
     """
-    notes: list[str] = []
+    notes = [UNTOLD]
     period: float | None = None
     for batch in bag.batches():
         if period is None and 'measurement' in batch.samples:

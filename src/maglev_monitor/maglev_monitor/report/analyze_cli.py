@@ -13,7 +13,7 @@ from typing import NoReturn
 
 from maglev_model.programs.command import leave_with
 from maglev_model.programs.progress import Progress
-from maglev_monitor.bag.analysis import Analysis, analyse
+from maglev_monitor.bag.analysis import UNTOLD, Analysis, analyse
 from maglev_monitor.bag.errors import BagError, refuse
 from maglev_monitor.bag.reader import run_folder
 from maglev_monitor.metrics.result_file import write_metrics
@@ -45,7 +45,7 @@ def analyze(arguments: Sequence[str] | None = None) -> int:
     for analysis in analyses:
         print(as_text(analysis.result))
     print(f'report: {page}')
-    if notes:
+    if any(note != UNTOLD for note in notes):
         return BAD_BAG
     passed = all(analysis.result['verdict'] == 'pass' for analysis in analyses)
     return PASS if passed else NOT_PASSED

@@ -48,11 +48,7 @@ def render(analysis: Analysis, replay: str = '') -> str:
         bullets('Missing samples', [holes({key: hole}) for key, hole in result['holes'].items()]),
         _cards(result),
         _errors_tables(result, published_tracking(analysis)),
-        _tables(
-            'Repeatability, ISO 230-2',
-            tables.REPEATABILITY.values(),
-            tables.repeatability(result),
-        ),
+        _tables('Repeatability, ISO 230-2', tables.REPEATED, tables.repeatability(result)),
         _steps_tables(result),
         _further_table(result.get('further', {})),
         _limits_table(result),

@@ -23,6 +23,9 @@ REPEATABILITY = {
 }
 """Figures of ISO 230-2 as the standard calls them; :mod:`..metrics.repeatability` explains them."""
 
+REPEATED = (*REPEATABILITY.values(), 'targets', 'approaches')
+"""The heads of their table; approaches are the fewest that a target has from one side."""
+
 STEPS = ('from', 'to', 'overshoot', 't_s', 't_enc')
 
 NAMES = {'true': 'true position', 'own': "encoders' own scales", 'measured': 'as counted'}
@@ -59,10 +62,14 @@ def _step(step: Mapping[str, Any]) -> list[str]:
 
 
 def repeatability(result: Mapping[str, Any]) -> Iterator[tuple[str, list[list[str]]]]:
-    """Whose, and rows of axis and :data:`REPEATABILITY`, of runs that go to targets repeatedly."""
+    """Whose, and rows of axis and :data:`REPEATED`, of runs that go to targets repeatedly."""
     for source, axes in result['repeatability'].items():
         rows = [
-            [axis, *(micro(axis, found[key]) for key in REPEATABILITY)]
+            [
+                axis,
+                *(micro(axis, found[key]) for key in REPEATABILITY),
+                *(str(found[key]) for key in ('targets', 'approaches')),
+            ]
             for axis, found in axes.items()
         ]
         yield NAMES[source], rows

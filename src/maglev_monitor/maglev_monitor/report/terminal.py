@@ -18,7 +18,7 @@ def as_text(figures: Mapping[str, Any]) -> str:
     lines = [
         _title(figures),
         *_lines('tracking', tables.ERRORS.values(), tables.errors(figures)),
-        *_lines('ISO 230-2', tables.REPEATABILITY.values(), tables.repeatability(figures)),
+        *_lines('ISO 230-2', tables.REPEATED, tables.repeatability(figures)),
         *_lines('steps', tables.STEPS, tables.steps(figures)),
         *_other_lines(figures),
     ]
