@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,9 @@ def fly(flight: Flight, signals: Signals) -> int:
         check_overlay(path, flight.namespace)
     if os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE') == 'OFF':
         raise WrongUseError('with ROS_AUTOMATIC_DISCOVERY_RANGE=OFF no node sees another: unset it')
+    domain = os.environ.get('ROS_DOMAIN_ID', '')
+    if not re.fullmatch('0[xX][0-9a-fA-F]+|[0-9]*', domain):  # ROS takes -1 for 0, and 5a for 5
+        raise WrongUseError(f"ROS_DOMAIN_ID is '{domain}', it must be a whole number, as 42")
     commands = {node: flight.program(node) for node in (*START_ORDER, *flight.views)}
     analyze = program('maglev_monitor', 'analyze')
     replay = program('maglev_view', 'replay') if 'view' in flight.views else None

@@ -23,6 +23,14 @@ def test_nodes(ros2: Ros2, small: Process) -> None:
     assert out.endswith('\n  Service Clients:\n\n  Action Servers:\n\n  Action Clients:\n\n')
 
 
+@pytest.mark.parametrize('domain', ['0x46', '70a'])
+def test_a_domain_is_the_one_that_ros_makes_of_it(
+    domain: str, ros2: Ros2, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv('ROS_DOMAIN_ID', domain)
+    assert ros2('node', 'list') == (0, '', '')
+
+
 def test_an_unknown_node(ros2: Ros2, small: Process) -> None:
     assert ros2('node', 'info', '/none') == (1, '', "Unable to find node '/none'\n")
     assert ros2('param', 'get', '/none', 'x') == (1, '', 'Node not found\n')

@@ -75,6 +75,17 @@ def test_nodes_that_would_never_see_each_other_are_not_started(
     assert not tree.out.exists()
 
 
+@pytest.mark.parametrize('domain', ['-1', '5a', ' '])
+def test_a_domain_that_ros_would_take_for_another_is_refused(
+    domain: str, tree: Tree, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv('ROS_DOMAIN_ID', domain)
+    code, output = tree.run()
+    assert code == 2
+    assert f"ROS_DOMAIN_ID is '{domain}', it must be a whole number" in output
+    assert not tree.out.exists()
+
+
 @pytest.mark.parametrize(
     ('options', 'words'),
     [

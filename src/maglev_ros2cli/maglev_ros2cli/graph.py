@@ -160,7 +160,7 @@ def discover(
 def _complete(own: PollingNode, waited: float) -> bool:
     """Whether every participant of this machine is seen, and those of others have had the time."""
     try:
-        there = local_participants(int(os.environ.get('ROS_DOMAIN_ID') or 0))
+        there = local_participants(own.context.get_domain_id())
     except OSError:
         return waited >= ABROAD_WAIT
     infos = [info for topic in _EVERYWHERE for info in own.get_publishers_info_by_topic(topic)]
