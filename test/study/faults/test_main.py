@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from maglev_study.command import INTERRUPTED, WRONG_USE
-from maglev_study.faults.draw import from_json, scenario, to_json
+from maglev_study.faults.draw import MOST_SEED, from_json, scenario, to_json
 from maglev_study.faults.fly import Scenario
 from maglev_study.faults.kinds import Fault
 from maglev_study.faults.main import BROKEN, PASS, run
@@ -51,6 +51,15 @@ def test_a_file_without_a_run_is_refused(
     assert run(['--replay', str(path), '--out', str(tmp_path)]) == WRONG_USE
     assert str(path) in capsys.readouterr().err
     assert run(['--replay', str(tmp_path / 'none'), '--out', str(tmp_path)]) == WRONG_USE
+
+
+@pytest.mark.parametrize('option', ['--replay', '--seed'])
+def test_a_seed_of_no_run_is_refused(
+    option: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run([option, str(MOST_SEED + 1), '--out', str(tmp_path)]) == WRONG_USE
+    said = f'there is no run of seed {MOST_SEED + 1}: seeds go from 0 to {MOST_SEED}'
+    assert capsys.readouterr().err == f'faults: error: {said}\n'
 
 
 @pytest.mark.parametrize(

@@ -9,12 +9,16 @@ from typing import Any
 
 import numpy as np
 
+from maglev_model.parameters import ParameterError
 from maglev_study.faults.catalogue import KINDS
 from maglev_study.faults.fly import Scenario
 from maglev_study.faults.kinds import Fault
 
 PER_MACHINE = 60
 """Runs that one machine's programme is flown for."""
+
+MOST_SEED = PER_MACHINE * 2**31 - 1
+"""The greatest: a machine's number seeds its noise, which takes 31 bits."""
 
 _LATEST = 500  # of a second fault after the first [ms]
 
@@ -36,7 +40,12 @@ def _order(round_: int) -> tuple[int, ...]:
 
 
 def scenario(seed: int, *, double: bool = False) -> Scenario:
-    """The run of a seed; ``double``: with a second fault up to 0.5 s after the first."""
+    """The run of a seed; ``double``: with a second fault up to 0.5 s after the first.
+
+    Raises ParameterError beyond :data:`MOST_SEED`.
+    """
+    if seed > MOST_SEED:
+        raise ParameterError(f'there is no run of seed {seed}: seeds go from 0 to {MOST_SEED}')
     table = cells()
     name, phase = table[_order(seed // len(table))[seed % len(table)]]
     rng = np.random.default_rng([161803, seed])
