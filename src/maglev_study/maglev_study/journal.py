@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, BinaryIO, Generic, TypeVar
 
 from maglev_model.parameters import ParameterError
 
@@ -31,22 +32,35 @@ class Journal(Generic[T]):
         """Begin a file, or go on with one.
 
         ``head`` tells campaigns apart; the two functions make plain values of what is flown, and it
-        of them. Raises :class:`ParameterError` where the file that is there
-        is another's, or none of a campaign, and OSError where it cannot be written.
+        of them. Raises :class:`ParameterError` where the file that is there is another's, is being
+        written, or is none of a campaign, and OSError where it cannot be written.
         """
         self.path, self._to_json = path, to_json
         head = {'format': FORMAT, **head}
         self.flown: list[T] = []
+        self._file = path.open('a+b')
+        try:
+            self._go_on(head, from_json)
+        except BaseException:
+            self._file.close()
+            raise
+
+    def _go_on(self, head: Mapping[str, Any], from_json: Callable[[Any], T]) -> None:
+        try:
+            fcntl.lockf(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)  # which no fork inherits
+        except BlockingIOError as error:
+            raise ParameterError(
+                f"'{self.path}' is being written by another campaign: choose another --out"
+            ) from error
         kept = 0
-        if path.is_file():
-            for number, line in enumerate(_whole_lines(path)):
-                plain = self._read(line, number)
-                if number == 0:
-                    self._compare(plain, head)
-                else:
-                    self.flown += [from_json(one) for one in plain]
-                kept += len(line)
-        self._file = path.open('ab')
+        self._file.seek(0)
+        for number, line in enumerate(_whole_lines(self._file)):
+            plain = self._read(line, number)
+            if number == 0:
+                self._compare(plain, head)
+            else:
+                self.flown += [from_json(one) for one in plain]
+            kept += len(line)
         self._file.truncate(kept)
         if not kept:
             self._append(head)
@@ -84,8 +98,5 @@ class Journal(Generic[T]):
                 )
 
 
-def _whole_lines(path: Path) -> Iterator[bytes]:
-    with path.open('rb') as file:
-        for line in file:
-            if line.endswith(b'\n'):
-                yield line
+def _whole_lines(file: BinaryIO) -> Iterator[bytes]:
+    return (line for line in file if line.endswith(b'\n'))
