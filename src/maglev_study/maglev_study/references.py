@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -40,6 +41,16 @@ def shaped(
     position, velocity, acceleration = minimum_jerk(elapsed)
     way = goal - start
     return References(start + way * position, way / time * velocity, way / time**2 * acceleration)
+
+
+def confined(references: References, moves: Sequence[bool]) -> References:
+    """The same, but each axis that does not move, y, x, z, phi, theta, stays where it hovers."""
+    position, velocity, acceleration = references
+    return References(
+        np.where(moves, position, HOVER),
+        np.where(moves, velocity, 0.0),
+        np.where(moves, acceleration, 0.0),
+    )
 
 
 def joined(*parts: References) -> References:

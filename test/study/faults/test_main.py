@@ -67,6 +67,10 @@ def test_a_seed_of_no_run_is_refused(
     [
         ('sample_time: 0.0005', "'sample_time' of the bridge is 0.0005"),
         ('machine: {gap_max: 0.030}', "'machine.gap_max' is 0.03"),
+        (
+            'emulation: {guide: {locked: [false, false, true, false, false]}}',
+            "'emulation.guide.locked' locks z, which the programme that is flown moves",
+        ),
         ('machine: {mass_y: -7.0}', "'machine.mass_y' is -7"),
         ('fault: {jmup: 1.0}', "'fault.jmup'"),
         ('encoder: {resolution: [1e-5, 1e-5, 1e-5, 2e-5, 1e-5, 1e-5]}', "'encoder.resolution'"),

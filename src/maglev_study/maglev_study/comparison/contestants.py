@@ -8,6 +8,7 @@ from pathlib import Path
 
 from maglev_controller.laws import find_law
 from maglev_controller.parameters import ControllerParameters
+from maglev_model.axes import AXES, PHI, THETA
 from maglev_model.parameters import ParameterError, from_yaml, replace
 from maglev_plant.parameters import PlantParameters
 
@@ -19,11 +20,20 @@ class Contestant:
     name: str
     controller: ControllerParameters
     plant: PlantParameters
+    file: Path | None = None  # its own, with what it asks of other nodes
+
+    @property
+    def moves(self) -> tuple[bool, ...]:
+        """By axis, whether it can be asked to move: it is controlled, and the stage frees it."""
+        return tuple(
+            getattr(self.controller, axis).controlled and not locked
+            for axis, locked in zip(AXES, self.plant.guide.locked, strict=True)
+        )
 
     @property
     def tilts(self) -> bool:
-        """Whether it controls the tilts."""
-        return self.controller.phi.controlled and self.controller.theta.controlled
+        """Whether both tilts move."""
+        return self.moves[PHI] and self.moves[THETA]
 
     def stage(self, **overrides: object) -> PlantParameters:
         """The stage's parameters with further ones, whose dots are written as ``__``."""
@@ -72,4 +82,5 @@ def _contestant(params: Path, name: str, path: Path, overlays: Sequence[Path]) -
         name,
         from_yaml(ControllerParameters, 'controller', *controller),
         from_yaml(PlantParameters, 'plant', *plant),
+        path,
     )

@@ -11,7 +11,7 @@ import numpy as np
 from maglev_model.axes import AXES, THETA, FloatArray, X, Y
 from maglev_study.comparison.contestants import Contestant
 from maglev_study.comparison.flight import ENCODER, SETTLED, Flight, Step, judge
-from maglev_study.references import HOVER, ellipse
+from maglev_study.references import HOVER, confined, ellipse
 
 DISTURBANCE: Mapping[str, object] = {
     'disturbance__constant': (10.0, 10.0, 10.0, 1.0, 1.0),
@@ -93,7 +93,7 @@ def loops(contestant: Contestant) -> list[Row]:
     """Crossover and phase margin of every loop, as designed."""
     regulator = Flight(contestant).regulator
     margins = regulator.margins
-    shown = [margins[axis] for axis in (Y, X, THETA) if axis != THETA or contestant.tilts]
+    shown = [margins[axis] for axis in (Y, X, THETA) if contestant.moves[axis]]
     section = 'the loops as designed, y/x/theta'
     rows = []
     for title, values in (
@@ -141,7 +141,7 @@ def _step_row(
     experiment: StepExperiment,
     plants: Sequence[Mapping[str, object]],
 ) -> Row:
-    if experiment.axis == THETA and not contestant.tilts:
+    if not contestant.moves[experiment.axis]:
         return Row(section, experiment.title, NONE, ())
     target, start = HOVER.copy(), HOVER.copy()
     target[experiment.axis], start[experiment.axis] = experiment.end, experiment.start
@@ -182,7 +182,8 @@ def _ellipse_row(
     worst, lost = np.zeros(5), 0
     for plant in plants:
         flight = Flight(contestant, **plant)
-        references = ellipse(10.0 + measured, theta, flight.period, grow=GROW)
+        course = ellipse(10.0 + measured, theta, flight.period, grow=GROW)
+        references = confined(course, contestant.moves)
         outcome = flight.follow(references)
         if outcome is None:
             lost += 1

@@ -50,7 +50,7 @@ def region(contestant: Contestant, axis: int, quick: bool) -> Region:
     """Fly all steps of an axis; x steps start at -30 mm, tilts at 0. Tilts may be out of reach."""
     gap, size = grids(axis, quick)
     settling = np.full((gap.size, size.size), np.nan)
-    if axis != THETA or contestant.tilts:
+    if contestant.moves[axis]:
         flight = Flight(contestant)
         hover = flight.save()
         for row, start in enumerate(gap):

@@ -10,6 +10,7 @@ import numpy as np
 
 from maglev_controller.parameters import ControllerParameters
 from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_model.axes import AXES
 from maglev_model.parameters import ParameterError, from_yaml, replace
 from maglev_plant.parameters import OffsetParameters
 from maglev_study.faults.programme import ROOM
@@ -77,6 +78,12 @@ def _check_room(bridge: BridgeParameters) -> None:
             raise ParameterError(
                 f"parameter 'machine.{name}' is {value:g}: for the programme that is flown it must"
                 f' lie in [{lower:g}, {upper:g}]'
+            )
+    for axis, locked in zip(AXES, bridge.emulation.guide.locked, strict=True):
+        if locked and axis != 'phi':
+            raise ParameterError(
+                f"parameter 'emulation.guide.locked' locks {axis}, which the programme that is"
+                ' flown moves'
             )
 
 

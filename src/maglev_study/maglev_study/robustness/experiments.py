@@ -8,15 +8,17 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 
-from maglev_model.axes import AXES, PHI, THETA, FloatArray
+from maglev_model.axes import AXES, FloatArray
 from maglev_model.paper import TRACKING
 from maglev_study.comparison.experiments import DISTURBANCE, GROW, SHAPED_STEPS, StepExperiment
-from maglev_study.references import HOVER, References, ellipse, shaped
+from maglev_study.references import HOVER, References, confined, ellipse, shaped
 from maglev_study.rough_flights import THETA as ELLIPSE_THETA
 from maglev_study.rough_flights import experiments as rough_experiments
 
 _RUN_IN, _MEASURED = 10.0, 20.0  # of ellipses; of holds the second [s]
 _APPROACH, _REST, _STEP = 4.0, 5.0, 6.0  # to where a step begins, held there, of the step [s]
+ALL = (True,) * len(AXES)
+"""Axes, all of which move."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,8 +39,8 @@ class Experiment:
 
 
 @functools.lru_cache(maxsize=4)
-def experiments(period: float, tilts: bool = True) -> tuple[Experiment, ...]:
-    """All of them, a sample every ``period`` [s]; without ``tilts`` none of these is asked for."""
+def experiments(period: float, moves: tuple[bool, ...] = ALL) -> tuple[Experiment, ...]:
+    """All of them, a sample every ``period`` [s]; only what ``moves``, by axis, is asked to."""
     course = ellipse(_RUN_IN + _MEASURED, ELLIPSE_THETA, period, grow=GROW)
     rough = {one.name: one for one in rough_experiments(period, hold=_MEASURED, places=1)}
     scan, hold = rough['scan 2 mm/s'], rough['hold 1']
@@ -50,20 +52,18 @@ def experiments(period: float, tilts: bool = True) -> tuple[Experiment, ...]:
         Experiment('scan', scan.references, scan.measured),
         Experiment('hold', hold.references, hold.measured),
     ]
-    if tilts:
-        return tuple(found)
     return tuple(
-        dataclasses.replace(one, references=_level(one.references))
+        dataclasses.replace(one, references=confined(one.references, moves))
         for one in found
-        if one.step is None or one.step.axis != THETA
+        if one.step is None or moves[one.step.axis]
     )
 
 
 def chosen(
-    period: float, tilts: bool = True, names: Collection[str] = ()
+    period: float, moves: tuple[bool, ...] = ALL, names: Collection[str] = ()
 ) -> tuple[Experiment, ...]:
     """Those of some ``names`` that there are, all for none; arguments as of :func:`experiments`."""
-    found = experiments(period, tilts)
+    found = experiments(period, moves)
     return tuple(one for one in found if one.name in names) if names else found
 
 
@@ -82,11 +82,3 @@ def _beside(axis: int, value: float) -> FloatArray:
     place = np.array(HOVER)
     place[axis] = value
     return place
-
-
-def _level(references: References) -> References:
-    """The same, with both tilts at rest."""
-    found = References(*(part.copy() for part in references))
-    for part in found:
-        part[:, PHI:] = 0.0
-    return found

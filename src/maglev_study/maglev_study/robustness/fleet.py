@@ -38,7 +38,7 @@ class Plan:
 
     def experiments(self, contestant: Contestant) -> tuple[Experiment, ...]:
         """What a law is flown through."""
-        return chosen(contestant.plant.sample_time, contestant.tilts, self.names)
+        return chosen(contestant.plant.sample_time, contestant.moves, self.names)
 
     def draw(self, contestant: Contestant, number: int) -> Machine:
         """A machine by its number, about the stage that a law flies on."""

@@ -70,7 +70,7 @@ class Flown:
 def fly(machine: Machine, contestant: Contestant, names: Collection[str] = ()) -> list[Flown]:
     """A drawn machine under a law, through the experiments of some ``names``, or through all."""
     flown = dataclasses.replace(contestant, plant=machine.plant)
-    found = chosen(machine.plant.sample_time, contestant.tilts, names)
+    found = chosen(machine.plant.sample_time, contestant.moves, names)
     with _one_at_a_time:
         return [_fly(machine.number, flown, experiment) for experiment in found]
 

@@ -26,9 +26,6 @@ if TYPE_CHECKING:
     from maglev_study.robustness.fly import Flown
     from maglev_study.robustness.guarantee import Guarantees
 
-_LEVEL = 'reference:\n  ros__parameters:\n    sinusoids: {theta: {amplitude: [0.0]}}\n'
-"""What of the ellipse in 4DOF a campaign flies under a law that does not control the tilts."""
-
 
 def main() -> NoReturn:
     """Entry point of the executable."""
@@ -150,20 +147,15 @@ def _named(path: Path, params: Path) -> str:
 
 
 def _write_machine(plan: Plan, number: int, out: Path) -> tuple[int, dict[str, Any]]:
-    from maglev_model.parameters import to_yaml
     from maglev_monitor.metrics.result_file import write_whole
+    from maglev_study.robustness.replayed import sections
 
     if len(plan.contestants) != 1:
         raise ParameterError('--replay flies under one --law')
     (contestant,) = plan.contestants
-    drawn = plan.draw(contestant, number)
     path = out / f'machine-{number}.yaml'
-    tables = [to_yaml(drawn.plant, 'plant'), to_yaml(contestant.controller, 'controller')]
-    if not contestant.tilts:
-        tables.append(_LEVEL)
-    write_whole(path, f'# Machine {number} of seed {plan.seed}, law {contestant.name}\n')
-    with path.open('a', encoding='utf-8') as file:
-        file.writelines(tables)
+    head = f'# Machine {number} of seed {plan.seed}, law {contestant.name}\n'
+    write_whole(path, head + sections(plan.draw(contestant, number), contestant))
     print(f'machine {number}: {path}')
     return DONE, {'machine': number, 'files': [str(path)]}
 
