@@ -107,6 +107,13 @@ def whole(name: str, value: str) -> str:
     return value
 
 
+def number_of(name: str, value: str) -> str:
+    """How many there are, at least one."""
+    if not int(whole(name, value)):
+        raise WrongUseError(f"{name} is '{value}', it must be at least 1")
+    return value
+
+
 def namespace(name: str, value: str) -> str:
     """A namespace of ROS, made absolute."""
     full = value if value.startswith('/') else f'/{value}'

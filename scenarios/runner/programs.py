@@ -12,7 +12,7 @@ from typing import NoReturn
 
 from runner.common_options import OUTPUT, Job, as_given, out_folder, out_option, overlays, talk
 from runner.graph import Flight, Scenario
-from runner.options import Command, Option, WrongUseError, whole
+from runner.options import Command, Option, WrongUseError, number_of, whole
 from runner.overlays import DISTRIBUTIONS, PARAMS, SECTIONS, check_overlay
 from runner.process import installed, program, run_to_end
 from runner.run import fly
@@ -24,7 +24,7 @@ EXPERIMENT = Option(
     'EXPERIMENT...',
     several=True,
 )
-JOBS = Option('processes (default: one for each core)', 'J', whole)
+JOBS = Option('processes (default: one for each core)', 'J', number_of)
 SCHEDULER = Option('a Dask cluster to fly on, tcp://HOST:8786', 'ADDRESS')
 HEARD_BY_FAULTS = ('controller', 'hw_bridge', '**')
 HEARD_BY_COMPARE = ('controller', 'plant', '**')
@@ -49,7 +49,7 @@ def _compare(options: Sequence[str]) -> Job:
 def _faults(options: Sequence[str]) -> Job:
     of = 'parameters of bridge and controller, as of a machine of your own'
     table = {
-        '--runs': Option('how many runs (default 3000)', 'N', whole),
+        '--runs': Option('how many runs (default 3000)', 'N', number_of),
         '--seed': Option('of the first run; the others count up (default 0)', 'S', whole),
         '--jobs': JOBS,
         '--double': Option('a second fault up to 0.5 s after the first'),
@@ -69,7 +69,7 @@ def _robustness(options: Sequence[str]) -> Job:
     of = "parameters of plant, controller and distributions on top of every law's own"
     laws = 'files of params/laws, paper, default (default: default)'
     table = {
-        '--machines': Option('how many are drawn (default 200)', 'N', whole),
+        '--machines': Option('how many are drawn (default 200)', 'N', number_of),
         '--params': overlays(of),
         '--law': Option(laws, 'NAME...', several=True),
         '--experiment': EXPERIMENT,
@@ -100,8 +100,8 @@ def _tune(options: Sequence[str]) -> Job:
     of = "parameters of plant, controller and distributions on top of the law's own"
     margin = 'gain that all currents at once must be guaranteed, up and down (default 6.0)'
     table = {
-        '--machines': Option('how many are drawn (default 40)', 'N', whole),
-        '--trials': Option('how many numbers are tried (default 60)', 'N', whole),
+        '--machines': Option('how many are drawn (default 40)', 'N', number_of),
+        '--trials': Option('how many numbers are tried (default 60)', 'N', number_of),
         '--margin': Option(margin, 'DB'),
         '--params': overlays(of),
         '--law': Option('the law that is tuned (default: default)', 'LAW'),

@@ -13,6 +13,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
+from maglev_monitor.bag.errors import BagError
+
 FOLDER = Path(__file__).resolve().parents[2] / 'examples'
 NOTEBOOKS = sorted(path.stem for path in FOLDER.glob('*.ipynb'))
 
@@ -72,6 +74,21 @@ def test_from_a_bag_to_a_figure(bag: Path, tmp_path: Path) -> None:
     assert (tmp_path / 'errors.pdf').read_bytes().startswith(b'%PDF')
     assert set(left.measured['phase']) <= {3, 4}
     assert len(left.errors['y']) > 0
+
+
+def test_the_figure_goes_beside_the_newest_bag(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip('pandas', reason='pandas comes with the test tools')
+    given, read = cells('3_from_a_bag_to_a_figure')[1:3]
+    (tmp_path / 'examples').mkdir()
+    monkeypatch.chdir(tmp_path / 'examples')
+    left: dict[str, Any] = {}
+    with pytest.raises(BagError, match='there is no bag'):
+        exec(''.join(given['source'] + ['\n'] + read['source']), left)
+    (tmp_path / 'runs' / 'flight' / 'bag').mkdir(parents=True)
+    exec(''.join(given['source']), left)
+    assert left['out'].resolve() == tmp_path / 'runs' / 'flight' / 'errors.pdf'
 
 
 def test_linear_analysis() -> None:

@@ -9,6 +9,7 @@ from stand_ins import NODES, ROOT, Tree
 from maglev_model.parameters import read_argument, specs
 from maglev_reference.parameters import ReferenceParameters
 from runner import options, overlays
+from runner.commands import main
 from runner.graph import text_value
 
 WATCHING = ('monitor', 'recorder')
@@ -73,6 +74,16 @@ def test_nodes_that_would_never_see_each_other_are_not_started(
     assert code == 2
     assert 'with ROS_AUTOMATIC_DISCOVERY_RANGE=OFF no node sees another' in output
     assert not tree.out.exists()
+
+
+@pytest.mark.parametrize('name', ['robustness', 'faults', 'tune'])
+def test_none_of_what_is_flown_or_flies_is_refused_before_the_set_up(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    many = '--runs' if name == 'faults' else '--machines'
+    for option, value in ((many, '0'), ('--jobs', '00'), (many, 'nan')):
+        assert main(['--check', name, option, value]) == 2
+        assert f"{option} is '{value}', it must be" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize('domain', ['-1', '5a', ' '])

@@ -116,6 +116,15 @@ def test_a_bag_without_a_monitor_goes_by_the_time_of_the_stage(
         assert found['settling_time'] == pytest.approx(slower * wanted['settling_time'])
 
 
+def test_the_standard_output_is_no_file(
+    bag: Path, tmp_path: Path, capsys: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert export([str(bag), '--out', '-']) == FAILED
+    assert capsys.readouterr().err == "export: error: '-' is no file, and no run goes to a pipe\n"
+    assert not list(tmp_path.iterdir())
+
+
 def test_what_is_no_run_is_refused(tmp_path: Path, capsys: Any) -> None:
     with pytest.raises(BagError, match='there is no bag'):
         table(tmp_path / 'nothing')

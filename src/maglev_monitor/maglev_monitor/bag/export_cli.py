@@ -28,6 +28,8 @@ def export(arguments: Sequence[str] | None = None) -> int:
     form, out = options.format, options.out
     if form is None:
         form = out.suffix[1:] if out and out.suffix[1:] in FORMATS else 'csv'
+    if out == Path('-'):
+        return refuse('export', "'-' is no file, and no run goes to a pipe", FAILED)
     out = out or run_folder(options.bag) / f'samples.{form}'
     try:
         found = table(options.bag, Progress('export: read', '%', lines=False))
