@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
 import textwrap
 from typing import Any
 
@@ -9,6 +11,7 @@ import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from ros2_command import COMMAND
 from std_msgs.msg import (
     Bool,
     Float64,
@@ -140,6 +143,21 @@ def test_fill_with_the_time_of_publication() -> None:
 def test_what_does_not_fit_is_refused(message: Any, values: str, words: str) -> None:
     with pytest.raises(CommandError, match=f'Failed to populate field: .*{words}'):
         fill(message, values_of(values))
+
+
+def test_nothing_is_filled_in_where_the_checks_are_left_out() -> None:
+    words = ['topic', 'pub', '--once', '-w', '0', '/unchecked', 'std_msgs/msg/Bool']
+    found = subprocess.run(
+        [*COMMAND, *words, 'data: yes please'],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        env={**os.environ, 'PYTHONOPTIMIZE': '1'},
+    )
+    assert found.returncode == 1
+    assert found.stderr == (
+        'With PYTHONOPTIMIZE Python leaves out the checks of values: unset it\n'
+    )
 
 
 def test_values_are_a_dictionary() -> None:

@@ -155,8 +155,10 @@ def fill(message: Any, values: Any) -> list[Stamper]:
     ``auto`` for a header and ``now`` for a time are for those who publish it to set, by calling
     what is returned with the time.
 
-    :raises CommandError: naming what cannot be set.
+    :raises CommandError: naming what cannot be set, and where Python leaves out its checks.
     """
+    if not __debug__:
+        raise CommandError('With PYTHONOPTIMIZE Python leaves out the checks of values: unset it')
     stampers: list[Stamper] = []
     try:
         _fill(message, values, stampers)
