@@ -206,6 +206,12 @@ def test_in_one_process_the_one_that_fails_ends_both(nodes: Nodes) -> None:
     assert (nodes.folder / 'other' / 'metadata.yaml').is_file()  # its bag is finished
 
 
+def test_in_one_process_the_one_is_no_sign_that_the_other_sees_the_graph(nodes: Nodes) -> None:
+    watchers = start_watchers(nodes, 'monitor:start_timeout:=6.0')
+    watchers.wait_for('no node of the run is seen')
+    watchers.wait_for('no run has begun within 6 s: no node of the run is seen')
+
+
 def test_others_read_and_play_a_bag(
     nodes: Nodes, observer: Observer, feeder: Feeder, run: Run
 ) -> None:

@@ -103,6 +103,8 @@ class MaglevNode(PollingNode, Generic[P]):
         """Whether what is wrong was said by :meth:`fail`."""
         self.ending: Callable[[], bool] = lambda: False
         """Whether a signal has told the process to end: nothing that takes its time is begun."""
+        self.in_process = {self.get_name()}
+        """The names of the nodes of this process, which see each other without a network."""
         self.discovering_since = discovery.begun()
         """When the middleware began to find who else is on the graph [s, monotonic]."""
         self._said_refused = False

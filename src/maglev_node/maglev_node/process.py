@@ -80,6 +80,7 @@ def _spin(nodes: Sequence[MaglevNode[Any]], caught: Sequence[int]) -> None:
 
     for node in nodes:
         node.ending = lambda: bool(caught)
+        node.in_process = {each.get_name() for each in nodes}
     if len(nodes) == 1:
         nodes[0].spin(stop)
     else:

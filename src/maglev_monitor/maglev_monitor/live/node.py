@@ -135,9 +135,8 @@ class MonitorNode(WatcherNode[MonitorParameters]):
 
     def _look_around(self, now: float) -> None:
         """Say early when discovery does not work, which nothing else would tell."""
-        here, itself = self.get_namespace(), self.get_name()
-        known = self.get_node_names_and_namespaces()
-        others = {name for name, where in known if where == here} - {itself}
+        here, known = self.get_namespace(), self.get_node_names_and_namespaces()
+        others = {name for name, where in known if where == here} - self.in_process
         self._discovery.update({name for name in others if not name.startswith('_')})  # ros2cli's
         warning = self._discovery.warning(now)
         if warning:
