@@ -132,7 +132,8 @@ def test_what_is_killed_in_flight_is_a_fault_and_hot(tmp_path: Path) -> None:
      '{"active": false, "load": "hot", "time": 0, "fault": 3}', b'\xff\xfe',
      '{"active": false, "load": [NaN,0,0,0,0,0,0,0,0,0,0,0], "time": 0, "fault": null}',
      '{"active": false, "load": [0,0,0,0,0,0,0,0,0,0,0,0], "time": NaN, "fault": null}',
-     '{"active": false, "load": [0,0,0,0,0,0,0,0,0,0,0,0], "time": 1%s}' % ('0' * 400)],
+     '{"active": false, "load": [0,0,0,0,0,0,0,0,0,0,0,0], "time": 1%s}' % ('0' * 400),
+     '[' * 100_000],
 )  # fmt: skip
 def test_a_damaged_file_is_a_fault_and_hot(tmp_path: Path, content: str | bytes) -> None:
     path = tmp_path / 'boards.json'
@@ -156,16 +157,6 @@ def test_without_a_file_the_amplifiers_count_as_hot(tmp_path: Path) -> None:
         stage.activate()
     cold(stage).activate()
     stage.close()
-
-
-@pytest.mark.parametrize(('passed', 'left'), [(2.0, 0.5 * np.exp(-1.0)), (-3600.0, 0.5)])
-def test_the_wall_clock_cools_and_never_heats(tmp_path: Path, passed: float, left: float) -> None:
-    parameters = build(BridgeParameters, {'boards.memory': str(tmp_path / 'boards.json')})
-    now = 1000.0
-    memory = Memory(parameters, lambda: now)
-    memory.keep(np.full(12, 0.5), None, active=False)
-    now += passed
-    assert memory.recall().load == pytest.approx(np.full(12, left))
 
 
 def test_a_fault_is_kept_as_it_was(tmp_path: Path) -> None:
@@ -243,6 +234,15 @@ def test_what_was_proven_with_another_driver_or_first_board_is_not(tmp_path: Pat
     memory.record_proof(rehearsed)
     assert not memory.proven(dataclasses.replace(rehearsed, driver='quanser'))
     assert not memory.proven(replace(rehearsed, {'boards.identifier': ('1', '0')}))
+
+
+def test_a_proof_that_cannot_be_read_proves_nothing(tmp_path: Path) -> None:
+    parameters = with_lines(tmp_path / 'boards.json')
+    memory = Memory(parameters)
+    for content in ('', '[' * 100_000):
+        memory.record_proof(parameters)
+        (tmp_path / 'boards-proven.json').write_text(content)
+        assert not memory.proven(parameters)
 
 
 def test_a_proof_is_forgotten_once_it_is_tried_anew(tmp_path: Path) -> None:

@@ -27,6 +27,7 @@ from maglev_model.contract.stage import Fault, StageError
 from maglev_model.parameters import ParameterError
 
 _FULL = 1.0  # I²t load of a phase that nobody knows anything about
+_BOOT = Path('/proc/sys/kernel/random/boot_id')
 _SEE = 'see to the machine and its amplifiers'
 
 
@@ -65,15 +66,34 @@ def memory_file(parameters: BridgeParameters) -> Path | None:
     return path
 
 
+def _since_boot() -> float:
+    """Time since the computer was started, asleep too [s]; nobody sets that clock."""
+    return time.clock_gettime(time.CLOCK_BOOTTIME)
+
+
+def _this_boot() -> str:
+    """What tells this start of the computer from all others; nothing where it does not say."""
+    try:
+        return _BOOT.read_text(encoding='ascii').strip()
+    except (OSError, UnicodeDecodeError):
+        return ''
+
+
 class Memory:
-    """The file of one pair of boards. ``clock`` tells the time of day [s]."""
+    """The file of one pair of boards.
+
+    ``clock`` tells the time since the computer was started [s], ``boot`` which start that was.
+    """
 
     def __init__(
-        self, parameters: BridgeParameters, clock: Callable[[], float] = time.time
+        self,
+        parameters: BridgeParameters,
+        clock: Callable[[], float] = _since_boot,
+        boot: Callable[[], str] = _this_boot,
     ) -> None:
         self._path = memory_file(parameters)
         self._thermal_time = parameters.amplifier.thermal_time
-        self._clock = clock
+        self._clock, self._boot = clock, boot
         self._lock: IO[str] | None = None
 
     def claim(self) -> None:
@@ -113,7 +133,7 @@ class Memory:
             text = ''
         try:
             return self._understand(json.loads(text))
-        except (ValueError, TypeError, KeyError, OverflowError):
+        except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
             reason = f"what '{self._path}' kept of the last run is damaged"
             return Kept(unknown, Fault('memory', reason, _SEE, True))
 
@@ -127,13 +147,23 @@ class Memory:
         kept_at = float(content['time'])
         if not math.isfinite(kept_at):
             raise ValueError
-        passed = max(self._clock() - kept_at, 0.0)  # a clock set back cools nothing
+        passed = self._passed(kept_at, content.get('boot'))
         given = content['fault']
         fault = None
         if given is not None:
             kind, reason, remedy, cut = given
             fault = Fault(str(kind), str(reason), str(remedy), bool(cut))
         return Kept(load * np.exp(-passed / self._thermal_time), fault)
+
+    def _passed(self, kept_at: float, boot: object) -> float:
+        """Time that has passed for sure [s]: the clock on the wall may have been set meanwhile.
+
+        Since an earlier start of the computer that is the time since its last one.
+        """
+        now, this = self._clock(), self._boot()
+        if not (boot and this):
+            return 0.0
+        return max(now - kept_at if boot == this else now, 0.0)
 
     def keep(self, load: FloatArray, fault: Fault | None, *, active: bool) -> None:
         """Write it, all or nothing. Raises StageError."""
@@ -143,6 +173,7 @@ class Memory:
             'active': active,
             'load': load.tolist(),
             'time': self._clock(),
+            'boot': self._boot(),
             'fault': None if fault is None else list(fault),
         }
         new = self._path.with_name(self._path.name + '.new')
@@ -181,7 +212,7 @@ class Memory:
         """Whether the last line was proven with what the parameters say of it."""
         try:
             content = json.loads(self._proof_file.read_text(encoding='utf-8'))
-        except (OSError, ValueError):
+        except (OSError, ValueError, RecursionError):
             return False
         return bool(content == _last_line(parameters))
 
