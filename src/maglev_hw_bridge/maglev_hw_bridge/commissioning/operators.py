@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import enum
 import math
+import os
 import select
 import sys
 import termios
@@ -165,12 +166,27 @@ def _answer(question: str, meanwhile: Meanwhile | None = None) -> str:
         raise EOFError
     if sys.stdin.isatty():
         termios.tcflush(sys.stdin, termios.TCIFLUSH)
-    if meanwhile is None:
-        return input(question)
+        if meanwhile is None:
+            return input(question)
     print(question, end='', flush=True)
-    while not select.select([sys.stdin], [], [], 0.0)[0]:
-        meanwhile()
-    return input()
+    return _line(sys.stdin.fileno(), meanwhile)
+
+
+def _line(stream: int, meanwhile: Meanwhile | None) -> str:
+    """The next line, and nothing beyond it. Raises EOFError.
+
+    Python's own reader takes all of a pipe at once, and what it has taken no ``select`` sees: the
+    next answer would be waited for while it is there.
+    """
+    line = b''
+    while not line.endswith(b'\n'):
+        while meanwhile is not None and not select.select([stream], [], [], 0.0)[0]:
+            meanwhile()
+        sign = os.read(stream, 1)
+        if not sign:
+            raise EOFError
+        line += sign
+    return line.decode(errors='replace')
 
 
 class EmulatedPerson:
