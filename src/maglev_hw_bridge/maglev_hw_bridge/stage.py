@@ -15,27 +15,20 @@ import numpy as np
 from maglev_hw_bridge import amplifiers, faults
 from maglev_hw_bridge.drivers import Driver, DriverError, Truthful
 from maglev_hw_bridge.landing import Landing, impacts_of_cut, push_is_softer
-from maglev_hw_bridge.life_cycle import StageLife
 from maglev_hw_bridge.mode import Mode as Mode
 from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.resting import RestingStage
 from maglev_hw_bridge.sensing import guard
 from maglev_hw_bridge.sensing.gap_knock import GapKnock
 from maglev_hw_bridge.sensing.knock import Knock
 from maglev_model.axes import AXES, FloatArray
 from maglev_model.contract.stage import EncoderSample, Fault, StageError, Truth, motor_currents
 
-_ON_THE_STOP, _AT_REST = 1.8e-5, 1e-2  # nearer the lower stop and slower it rests [m], [m/s]
-_NEAR, _STILL, _REST_TIME = 2e-4, 2e-5, 0.1  # so it does where it moves no more there [m, m, s]
-_PARKED = 1e-4  # so far at most it moves along x and z in that time where it stands [m]
-_CREPT = 0.5  # what it moves in longer it crept, as under the pull of a cable [s]
-_SLIDING = 0.1  # faster it is moved, or homed [m/s]
-_CORNERS = np.array([[-1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, -1.0]])  # (5): gaps by phi, theta
 _SOFT = 0.05  # a degraded landing's speed at the stop [m/s]
 _ROUNDING = 0.2  # of how many samples late
-_LEFT, _SOON = 3e-4, 0.02  # what rested and is, or soon will be, farther off has left it [m], [s]
 
 
-class BridgeStage(StageLife):
+class BridgeStage(RestingStage):
     """The :class:`~maglev_model.contract.stage.Stage` on boards, one sample per :meth:`read`."""
 
     paced = True
@@ -59,18 +52,10 @@ class BridgeStage(StageLife):
         self._flowed = np.zeros(12)  # phase currents until the sample read last [A]
         self._behind = 0  # samples that this one was late by
         self._to_catch_up = 0  # late samples still to come when the landing began
-        self._lower_stop = self.parameters.machine.gap_max
         self._stale_samples = math.ceil(self.parameters.fault.stale / self.sample_time - 1e-9)
-        self._one_count = 1.5 * max(self.parameters.encoder.resolution[4:])  # of x or z [m]
         self._longest_stop = round(self.parameters.boards.stop_time / self.sample_time)
         self._landing_samples = 0
         self._named: set[tuple[int, ...]] = set()  # what the fault latched says of sensing
-        self._still_samples = 0  # that the platen has stood still near its lower stop,
-        self._still_at = 0.0  # and where [m]
-        self._rests = False  # has rested there since current flowed last
-        self._parked_samples = 0  # that it has stood still along x and z,
-        self._parked_at = np.zeros(2)  # and where [m]
-        self._was_at = np.zeros(2)  # a sample ago
         self._warm_up()
 
     @classmethod
@@ -200,75 +185,6 @@ class BridgeStage(StageLife):
         reason, remedy = faults.command_fault(code, index, i_d, i_q, self.amplifiers)
         self._raise_fault('current', reason, remedy)
         return '' if code == amplifiers.SPENT else reason
-
-    def _look_for_rest(self) -> None:
-        """Watch a platen that rests: only current, of which there is to be none, moves it away."""
-        y = self.guard.arrays.position[0]
-        above = self._lower_stop - y
-        if above < _NEAR and abs(y - self._still_at) < _STILL:
-            self._still_samples += 1
-        else:
-            self._still_samples, self._still_at = 0, y
-        begun = self.guard.arrays.samples > 1  # what rested in a life before may have been moved
-        self._rests = begun and not self.flying and (self._rests or self._on_the_stop())
-        slides = self._slides()
-        if self.mode is not Mode.FOLLOWING or not self._rests:
-            return
-        if self._leaves():
-            self._raise_fault('current', *faults.astray_fault(self.guard))
-        elif slides:
-            self._raise_fault('current', *faults.slide_fault())
-
-    def _leaves(self) -> bool:
-        """Whether a corner of a platen that rested is off the lower stop, or soon will be."""
-        state = self.guard.arrays
-        tilting = self.parameters.machine.radius * state.rate[3:] @ _CORNERS
-        above = self._lower_stop - state.length[:4]
-        return bool(np.max(above - _SOON * np.minimum(state.rate[0] + tilting, 0.0)) > _LEFT)
-
-    def _slides(self) -> bool:
-        """Whether a platen that stood still for a while is off that place along x or z.
-
-        Who leaps from sample to sample was moved, or homed, while nobody looked.
-        """
-        if self.flying:
-            self._parked_samples = 0
-            return False
-        place = self.guard.arrays.position[1:3]
-        away = float(np.max(np.abs(place - self._parked_at)))
-        most = max(_SLIDING * self.sample_time, self._one_count)
-        if self.guard.arrays.samples <= 1:
-            most = _PARKED
-        leapt = float(np.max(np.abs(place - self._was_at))) > most
-        parked = self._parked_samples * self.sample_time >= _REST_TIME
-        slid = parked and not leapt and away > _LEFT
-        if leapt or slid or (away >= _PARKED and not parked):
-            self._parked_samples = 0
-            self._parked_at[:] = place
-        else:
-            self._parked_samples += 1
-        if self._parked_samples * self.sample_time >= _CREPT:
-            self._parked_samples = round(_REST_TIME / self.sample_time)
-            self._parked_at[:] = place
-        self._was_at[:] = place
-        return slid
-
-    def _touches(self) -> bool:
-        """Whether the platen is on its lower stop as the observer has it."""
-        return self._rests_at(self.guard.arrays.position[0])
-
-    def _rests_at(self, y: float) -> bool:
-        slow = abs(self.guard.arrays.rate[0]) < _AT_REST
-        return bool(slow and y > self._lower_stop - _ON_THE_STOP)
-
-    def _on_the_stop(self) -> bool:
-        """Whether it may well rest there, though the observer has it a little above.
-
-        That one takes no account of what the stop carries, and lags behind the counts where the
-        platen has come to rest a moment ago.
-        """
-        still = self._still_samples * self.sample_time >= _REST_TIME
-        return still or self._touches() or self._rests_at(np.min(self.guard.arrays.believed[:4]))
 
     def _put_out(self) -> None:
         if self.mode is Mode.LANDING:
