@@ -19,9 +19,9 @@ def test_what_lands_is_not_begun_anew_by_who_asks_for_it() -> None:
     aloft(stage)
     stage.land('for a test')
     assert (stage.mode, stage.why, stage.fault) == (Mode.LANDING, 'for a test', None)
-    stage._landing_samples = 17
+    stage.landing.arrays.elapsed = 0.17
     stage.land('for another')
-    assert (stage._landing_samples, stage.why) == (17, 'for a test')
+    assert (stage.landing.arrays.elapsed, stage.why) == (0.17, 'for a test')
 
 
 def test_a_stop_says_what_it_is() -> None:
@@ -54,16 +54,6 @@ def test_the_first_fault_stays_unless_a_landing_is_cut(monkeypatch: pytest.Monke
     assert not boards.lines.enabled
     stage._raise_fault('current', 'fourth', 'four', cut=True)
     assert stage.fault == both, 'nothing lands any more'
-
-
-def test_a_stop_while_a_fault_is_latched_refuses_one_reset() -> None:
-    stage, _ = active()
-    stage.stop('first')
-    stage.stop('second')
-    cleared, why = stage.reset()
-    assert not cleared
-    assert 'second' in why
-    assert stage.reset() == (True, 'cleared: first')
 
 
 def test_what_is_cut_is_of_the_kind_that_cuts_it_unless_an_encoder_failed_before() -> None:
@@ -162,26 +152,11 @@ def test_a_landing_goes_on_with_every_sample_and_drives_what_it_answers(
     drive = Calls((amplifiers.FINE, 0))
     monkeypatch.setattr(stage, '_drive', drive)
     stage.hold()
-    assert stage._landing_samples == 1
+    assert stage.landing.arrays.elapsed == pytest.approx(1e-3)
     ((i_d, i_q),) = drive.given
     assert i_d is stage.landing.direct_current
     assert i_q is stage.landing.quadrature_current
     assert np.any(i_d)
-
-
-@pytest.mark.parametrize(('kind', 'ends'), [('stop', True), ('encoder', False)])
-def test_only_a_landing_for_a_stop_has_a_longest_time(kind: str, *, ends: bool) -> None:
-    stage, _ = active(boards__stop_time=1.5)
-    aloft(stage)
-    stage.stop('for a test', kind)
-    for _ in range(1500):
-        watched(stage)
-        stage.landing.begin(stage.guard.arrays.position, np.zeros(5))
-        stage._descend()
-    assert stage.mode is Mode.LANDING
-    stage.landing.begin(stage.guard.arrays.position, np.zeros(5))
-    stage._descend()
-    assert stage.mode is (Mode.DISABLED if ends else Mode.LANDING)
 
 
 def test_a_platen_that_leaves_its_way_down_is_cut() -> None:
@@ -194,21 +169,6 @@ def test_a_platen_that_leaves_its_way_down_is_cut() -> None:
     assert stage.mode is Mode.DISABLED
     assert stage.fault is not None
     assert (stage.fault.kind, stage.fault.cut) == ('current', True)
-
-
-@pytest.mark.parametrize(
-    ('code', 'goes_on'),
-    [(amplifiers.FINE, True), (amplifiers.SPENT, True), (amplifiers.OVER_CURRENT, False)],
-)
-def test_currents_of_a_landing_that_are_refused_end_it(
-    monkeypatch: pytest.MonkeyPatch, code: int, *, goes_on: bool
-) -> None:
-    stage, _ = active()
-    aloft(stage)
-    stage.land('for a test')
-    monkeypatch.setattr(stage, '_drive', lambda *_: (code, 0))
-    stage._descend()
-    assert stage.mode is (Mode.LANDING if goes_on else Mode.DISABLED)
 
 
 @pytest.mark.parametrize('code', [guard.RANGE, guard.GAP_RANGE])
@@ -342,10 +302,10 @@ def test_a_landing_begins_anew_where_it_sees_less_than_before(
     stage, _ = active()
     aloft(stage)
     stage.stop('for a test')
-    stage._landing_samples = 17
+    stage.landing.arrays.elapsed = 0.17
     blamed(stage, 0, trust=trust)
     if trust == LOST:
         stage.guard.arrays.trust[1] = LOST
     stage._sensing_fault(code, 0)
     assert stage.mode is Mode.LANDING
-    assert stage._landing_samples == (0 if anew else 17)
+    assert stage.landing.arrays.elapsed == (0.0 if anew else 0.17)

@@ -150,6 +150,21 @@ def then(first: Fault, second: Fault) -> Fault:
     )
 
 
+def landing_fault(
+    code: int, index: int, i_d: FloatArray, i_q: FloatArray, amplifier: Amplifiers
+) -> tuple[str, str]:
+    """Reason and remedy of a landing whose own currents were refused, by the code of ``drive``."""
+    reason, _ = command_fault(code, index, i_d, i_q, amplifier)
+    return f'the landing is given up: {reason}', 'check landing.* and the encoders'
+
+
+def overlong_fault(parameters: BridgeParameters) -> tuple[str, str]:
+    """Reason and remedy of a landing that an emergency stop does not wait for any longer."""
+    limit = parameters.boards.stop_time
+    reason = f'the platen is not down {limit:g} s after the emergency stop'
+    return reason, 'check boards.stop_time and landing.*, and what failed meanwhile'
+
+
 def lost_counts(parameters: BridgeParameters, watched: Guard) -> str:
     """Why the encoders do not tell any more where the platen is, or nothing."""
     if watched.failed:

@@ -26,6 +26,7 @@ from maglev_model.contract.stage import EncoderSample, Fault, StageError, Truth,
 
 _SOFT = 0.05  # a degraded landing's speed at the stop [m/s]
 _ROUNDING = 0.2  # of how many samples late
+_BOUNCE = 0.1  # sooner again a stop input is not pressed anew [s]
 
 
 class BridgeStage(RestingStage):
@@ -54,7 +55,9 @@ class BridgeStage(RestingStage):
         self._to_catch_up = 0  # late samples still to come when the landing began
         self._stale_samples = math.ceil(self.parameters.fault.stale / self.sample_time - 1e-9)
         self._longest_stop = round(self.parameters.boards.stop_time / self.sample_time)
-        self._landing_samples = 0
+        self._since_stop = -1  # samples that it lands since an emergency stop; -1: there was none
+        self._bounce = math.ceil(_BOUNCE / self.sample_time)
+        self._released = self._bounce  # samples since the stop input was pressed last, if no more
         self._named: set[tuple[int, ...]] = set()  # what the fault latched says of sensing
         self._warm_up()
 
@@ -112,11 +115,19 @@ class BridgeStage(RestingStage):
             self._begin_landing()
         self._ask()
         self._look_for_rest()
-        if self.driver.stop_pressed:
-            self._raise_fault('stop', 'the emergency stop is pressed', 'release it')
+        self._heed_stop_input()
         if self.driver.late > 0.5 * self.parameters.sample_time:
             self._late()
         return EncoderSample(length[:4].copy(), length.item(4), length.item(5))
+
+    def _heed_stop_input(self) -> None:
+        """Stop while it is pressed; beside a latched fault it is remembered, once for each time."""
+        if not self.driver.stop_pressed:
+            self._released = min(self._released + 1, self._bounce)
+            return
+        if self.fault is None or self._released == self._bounce:
+            self.stop('the emergency stop is pressed', remedy='release it')
+        self._released = 0
 
     def _ask(self) -> None:
         """Whether encoders that do not count do so when they are knocked, and go without if not."""
@@ -206,21 +217,23 @@ class BridgeStage(RestingStage):
 
     def _descend(self) -> None:
         state = self.guard.arrays
-        self._landing_samples += 1
+        self._since_stop += self._since_stop >= 0
         if self._to_catch_up > 0:  # until then the platen has gone on as before
             self._to_catch_up -= 1
             self.landing.begin(state.position, state.rate, self.guard.blind)
-        stopping = self.fault is not None and self.fault.kind == 'stop'
-        too_long = stopping and self._landing_samples > self._longest_stop
-        if self.landing.step(state.position, state.rate, state.disturbance) or too_long:
+        too_long = self._since_stop > self._longest_stop
+        if self.landing.step(state.position, state.rate, state.disturbance):
             self._disable()
-            return
-        if self.landing.astray:
+        elif too_long:
+            self._raise_fault('stop', *faults.overlong_fault(self.parameters), cut=True)
+        elif self.landing.astray:
             self._raise_fault('current', *faults.stray_fault(), cut=True)
-            return
-        code, _ = self._drive(self.landing.direct_current, self.landing.quadrature_current)
-        if code not in (amplifiers.FINE, amplifiers.SPENT):
-            self._disable()
+        else:
+            i_d, i_q = self.landing.direct_current, self.landing.quadrature_current
+            code, index = self._drive(i_d, i_q)
+            if code not in (amplifiers.FINE, amplifiers.SPENT):
+                why = faults.landing_fault(code, index, i_d, i_q, self.amplifiers)
+                self._raise_fault('current', *why, cut=True)
 
     # -- faults ------------------------------------------------------------------------------------
 
@@ -237,6 +250,8 @@ class BridgeStage(RestingStage):
         """
         if kind == 'stop' and self.fault is not None:
             self._stopped_since = why
+        if kind == 'stop' and self.mode is Mode.LANDING:
+            self._since_stop = max(self._since_stop, 0)
         self._raise_fault(kind, why, remedy or 'see to what made it necessary')
 
     def cut_askew(self) -> None:
@@ -268,7 +283,9 @@ class BridgeStage(RestingStage):
         if not self.flying or fails_in_lift or near:
             self._disable()
             return
-        self.mode, self._landing_samples = Mode.LANDING, 0
+        if self.mode is Mode.FOLLOWING:
+            self._since_stop = 0 if self.fault is not None and self.fault.kind == 'stop' else -1
+        self.mode = Mode.LANDING
         self._to_catch_up = self._behind
         self.landing.begin(state.position, state.rate, blind)
 
