@@ -35,6 +35,9 @@ class Node:
         self._meanwhile, self._agrees = meanwhile, agrees
         self.happened: list[str] = []
 
+    def get_name(self) -> str:
+        return 'node'
+
     def spin(self, stop: Callable[[], bool]) -> None:
         for _ in range(5):
             self._meanwhile()
