@@ -26,10 +26,10 @@ PERIOD, PASS, RUN_IN = 1e-3, 4000, 8000
 SHORT = {'learning.period': 0.4, 'learning.passes': 3}
 
 
-def learned_ellipse(*overlays: str) -> tuple[np.ndarray, IterativeLearning]:
+def learned_ellipse(*overlays: str, **effects: object) -> tuple[np.ndarray, IterativeLearning]:
     """Mean |e| (10, 5) of eight passes and two after, on the encoders' own scales, in micro."""
     files = [PARAMS / f'{name}.yaml' for name in ('machine', 'benchmark', *overlays)]
-    start = {'initial.position': tuple(HOVER)}
+    start = {'initial.position': tuple(HOVER), **{f'effects.{k}': v for k, v in effects.items()}}
     plant = replace(from_yaml(PlantParameters, 'plant', *files), start)
     table = from_yaml(ControllerParameters, 'controller', *files, PARAMS / 'learning.yaml')
     references = ellipse(PERIOD * (RUN_IN + 10 * PASS), 0.010, PERIOD, grow=2.0)
@@ -58,6 +58,18 @@ def test_and_on_the_rough_one() -> None:
     assert learning.arrays.state['stage'] == DONE
 
 
+@pytest.mark.parametrize('overlays', [(), ('rough',)])
+def test_and_where_all_magnets_are_off_the_model(overlays: tuple[str, ...]) -> None:
+    """By 10 %: what the internal model makes of it is not fed forward on top of that.
+
+    Once it was, y err by three times as much while that faded in, which ended the learning.
+    """
+    error, learning = learned_ellipse(*overlays, **{'motor.magnet': (1.1,) * 4})
+    assert learning.arrays.state['stage'] == DONE
+    assert np.all(error[1, :3] < error[0, :3])
+    assert np.all(error[-1, :3] < 0.92 * error[0, :3])
+
+
 # -- a pass at a time, with made-up samples --------------------------------------------------------
 
 
@@ -79,8 +91,12 @@ def pass_by(
         learning.learn(control.arrays)
 
 
+def learning_parameters(values: dict[str, object]) -> ControllerParameters:
+    return build(ControllerParameters, {**SHORT, 'learning.passes': 20, **values})
+
+
 def made_up(**values: object) -> tuple[IterativeLearning, Regulator, np.ndarray]:
-    parameters = build(ControllerParameters, {**SHORT, 'learning.passes': 20, **values})
+    parameters = learning_parameters(values)
     time = PERIOD * np.arange(400)
     return (
         IterativeLearning(parameters),
@@ -99,6 +115,46 @@ def test_a_repeated_force_is_learned() -> None:
     learning.rest()
     learning.look_ahead(control.arrays, True, *AT_REST)
     assert abs(control.arrays.axes['learned'][X]) < 0.005
+
+
+@pytest.mark.parametrize(
+    ('rested', 'share'), [('never', 0.0), ('at times', 1.0), ('always', 1.0), ('law', 1.0)]
+)
+def test_what_the_internal_model_makes_is_left_to_it(rested: str, share: float) -> None:
+    """Where it has that frequency, and its oscillators do not fade because the reference rests."""
+    law = {'law': 'test.other'} if rested == 'law' else {}
+    values = {'internal_model.fundamental': 2.0 * np.pi / 0.2}
+    learning, control, force = made_up(**values)
+    if law:
+        learning = IterativeLearning(replace(learning_parameters(values), law))
+    sample, axes = control.arrays.sample, control.arrays.axes
+    for k in range(1600):
+        axes['rested'][X] = 1.0 if rested == 'always' or (rested == 'at times' and k > 300) else 0.0
+        learning.look_ahead(control.arrays, True, *AT_REST)
+        sample['realised'][X] = -force[k % 400] - 0.2
+        learning.learn(control.arrays)
+    found = []
+    for _ in range(400):
+        learning.look_ahead(control.arrays, True, *AT_REST)
+        found.append(axes['learned'][X])
+        learning.learn(control.arrays)
+    mean = -0.2 if rested in ('at times', 'law') else 0.0
+    np.testing.assert_allclose(found, mean - share * force, atol=0.1)
+
+
+def test_what_was_loaded_is_fed_forward_whole(tmp_path: Path) -> None:
+    """An internal model that begins with it has nothing yet; then it stays, in every table."""
+    learned, control, force = made_up(**{'internal_model.fundamental': 2.0 * np.pi / 0.2})
+    for _ in range(4):
+        pass_by(learned, control, force, factor=0.0)
+    learned.save(tmp_path / 'learned.npz')
+    for learning in (learned, made_up(**{'internal_model.fundamental': 2.0 * np.pi / 0.2})[0]):
+        learning.load(tmp_path / 'learned.npz')
+        learning.rest()
+        for _ in range(4):
+            pass_by(learning, control, force, factor=0.0)
+        pass_by(learning, control, force[:51], factor=0.0)
+        assert control.arrays.axes['learned'][X] == pytest.approx(-force[50], abs=0.06)
 
 
 @pytest.mark.parametrize('way', [[[0.0, 2e-6, 0.0, 0.0, 0.0]], [[0.0] * 5, [0.0, 0.0, 0.01, 0, 0]]])

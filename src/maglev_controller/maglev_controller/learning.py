@@ -13,6 +13,11 @@ its delay; and as d does not depend on u, this is the mean of what the passes sh
 noise in it falls from pass to pass. The observer is told that u and f only balance other forces, so
 that its estimates, and through them the feedback, are not off by what these forces would move.
 
+What the internal model makes by itself, the mean and the waves that come whole in the period, is
+left to it: they are fed forward as they were when the reference began to repeat, whichever table
+has taken over since. Otherwise both would make them while a table fades in. An axis whose reference
+rests in between is fed all of it, since there its oscillators fade.
+
 What has been flown with the least errors is kept. An error that grows, of any axis and already
 within a pass, ends the learning and brings that back.
 """
@@ -25,6 +30,7 @@ from pathlib import Path
 from zipfile import BadZipFile
 
 import numpy as np
+from numpy.typing import NDArray
 
 from maglev_controller.design.digits import rounded
 from maglev_controller.learning_parameters import LearningParameters
@@ -51,6 +57,8 @@ _REMEMBERED = (STATE.names or ())[(STATE.names or ()).index('stage') :]
 _WINDOW = 1.65  # half length of the filter by sample rate / (bandwidth / 2π)
 _WHOLE = 1e-6  # of a sample
 _SAME = np.array([[1e-6], [1e-4]])  # place and speed of a beginning [m, rad; m/s, rad/s]
+_WHOLE_CYCLE = 1e-3  # of a cycle
+_INTERNAL_MODELS = ('output_regulator', 'regulator_3dof')  # laws that have one
 _LEAST = 0.25  # of a count: rms errors below it do not grow
 
 
@@ -72,6 +80,7 @@ class IterativeLearning:
         state['floor'] = samples * (_LEAST * _counts(parameters)) ** 2
         self._start = np.zeros((0, 5))  # position and velocity where a period begins, once known
         self._measured = self._repeats = False  # the last sample, what it belongs to
+        cycles, time = _cycles(parameters, samples), np.arange(samples) / samples
         self.arrays = LearningArrays(
             state=state,
             tables=np.zeros((TABLES, samples, 5)),
@@ -79,13 +88,16 @@ class IterativeLearning:
             error=np.zeros((samples, 5)),
             kernels=kernels,
             history=np.zeros((max(given.passes, 1), 5)),
+            cycles=cycles,
+            wave=np.stack([np.cos(2.0 * np.pi * time), np.sin(2.0 * np.pi * time)]),
+            parts=np.zeros((TABLES + 2, *cycles.shape, 2)),
         )
         if given.passes > 0:
             self.begin()
 
     @property
     def table(self) -> FloatArray:
-        """What is fed forward over a period (N, 5) [m/s², rad/s²]."""
+        """What is learned over a period (N, 5) [m/s², rad/s²], with what is left to others."""
         return np.asarray(self.arrays.tables[int(self.arrays.state['used'][0])])
 
     @property
@@ -133,6 +145,7 @@ class IterativeLearning:
             successor.arrays.state[name] = self.arrays.state[name]
         successor.arrays.tables[:] = self.arrays.tables
         successor.arrays.history[:] = self.arrays.history
+        successor._find_waves()
         successor._start = self._start
         successor.rest()
         return successor
@@ -214,6 +227,17 @@ class IterativeLearning:
         if wrong:
             raise ParameterError(f"parameter 'learning.file': {path} {wrong}")
         wanted[:], self._start = table, start
+        self._find_waves()
+
+    def _find_waves(self) -> None:
+        """Of the internal models' waves, what is in the tables."""
+        arrays = self.arrays
+        for axis, wave in np.argwhere(arrays.cycles >= 0):
+            cycles = int(arrays.cycles[axis, wave])
+            rows = cycles * np.arange(arrays.wave.shape[1]) % arrays.wave.shape[1]
+            share = (2.0 if cycles else 1.0) / rows.size
+            found = arrays.tables[:, :, axis] @ arrays.wave[:, rows].T
+            arrays.parts[:TABLES, axis, wave] = share * found
 
 
 def iterative_learning(parameters: ControllerParameters) -> IterativeLearning | None:
@@ -257,6 +281,23 @@ def _kernels(bandwidth: float, period: float, delay: int) -> FloatArray:
     bend = np.zeros(2 * (delay + 2) + 1)
     bend[2 * delay + 1 :] = np.array([0.5, -0.5, -0.5, 0.5]) / period**2
     return rounded(np.stack([np.pad(low, delay + 2), np.convolve(low, bend)]), 12)
+
+
+def _cycles(parameters: ControllerParameters, samples: int) -> NDArray[np.int64]:
+    """How often the waves of each axis' internal model come in a period (5, H), -1 for none.
+
+    Those that do not come whole, and integrators in place of an internal model, are none.
+    """
+    period = samples * parameters.sample_time
+    turns = parameters.internal_model.fundamental * period / (2.0 * np.pi)
+    found = np.full((5, max(len(axis.multiples) for axis in parameters.axes)), -1)
+    for row, axis in zip(found, parameters.axes, strict=True):
+        if parameters.law in _INTERNAL_MODELS:
+            cycles = turns * np.array(axis.multiples)
+            whole = np.abs(cycles - np.round(cycles)) < _WHOLE_CYCLE
+            kept = np.unique(np.round(cycles[whole]).astype(np.int64))
+            row[: kept.size] = kept
+    return found
 
 
 def _counts(parameters: ControllerParameters) -> FloatArray:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maglev_controller.step.arrays import ControlArrays, Record
+from maglev_controller.step.rest import REST
 from maglev_model.axes import FloatArray
 from maglev_model.compiled import borrowing
 
@@ -24,6 +25,17 @@ GREW: Final = 3
 
 TABLES: Final = 3
 """One that is flown, one that is written, the best."""
+
+KEPT: Final = TABLES
+"""Of the waves that are fed forward all the time, those of the table that it began with."""
+
+SUMS: Final = TABLES + 1
+"""Of the table that is written, so far."""
+
+RESTED: Final = 1
+MOVED: Final = 2
+SETTLED: Final = 0.2
+"""From when on it counts whether a repeated reference rests or moves [s]."""
 
 NO_WORSE: Final = 1.05
 """A pass whose squared errors are this by the least ones, or less, is as good: counts differ."""
@@ -42,6 +54,7 @@ STATE: Final = np.dtype(
         ('waits', '?'),  # for the period's beginning, to learn
         ('recorded', 'i8'),  # samples, without a break
         ('follows', '?'),  # whether the last sample belonged to the repeated reference
+        ('rests', 'i8', 5),  # RESTED and MOVED since that began, where oscillators fade
         ('sample', 'i8'),  # since that began
         ('share', 'f8', TABLES),  # of each table that is fed forward
         ('used', 'i8'),  # table that is fed forward
@@ -66,6 +79,9 @@ class LearningArrays(NamedTuple):
     error: FloatArray  # (N, 5) [m, rad]
     kernels: FloatArray  # (2, 2 R + 1), of `made` and of `error`
     history: FloatArray  # (passes, 5), rms errors [m, rad]
+    cycles: NDArray[np.int64]  # (5, H) in a period, of the internal models' waves; -1: none
+    wave: FloatArray  # (2, N), cosine and sine over a period
+    parts: FloatArray  # (3 + 2, 5, H, 2), of the waves in each table, in KEPT and in SUMS
 
 
 NO_LEARNING: Final = LearningArrays(
@@ -75,8 +91,59 @@ NO_LEARNING: Final = LearningArrays(
     np.zeros((1, 5)),
     np.zeros((2, 1)),
     np.zeros((1, 5)),
+    np.zeros((5, 0), np.int64),
+    np.zeros((2, 1)),
+    np.zeros((TABLES + 2, 5, 0, 2)),
 )
 """For compiled loops in which nothing is learned."""
+
+
+@borrowing
+def _waves(learning: LearningArrays, axis: int, place: int) -> float:
+    """What of the shares of all tables the internal model makes by itself [m/s², rad/s²].
+
+    Of an axis that rests in between that is nothing: oscillators fade there, and the observer that
+    believes counts less is off otherwise by what it is not told. Of one that never moves, the mean.
+    """
+    state, parts, total = learning.state[0], learning.parts, 0.0
+    if state.rests[axis] == RESTED + MOVED:
+        return total
+    for wave in range(learning.cycles.shape[1]):
+        cycles = learning.cycles[axis, wave]
+        if cycles < 0 or (cycles > 0 and state.rests[axis] == RESTED):
+            continue
+        row = (cycles * place) % state.samples
+        cosine, sine = learning.wave[0, row], learning.wave[1, row]
+        for table in range(TABLES):
+            a = parts[table, axis, wave, 0] - parts[KEPT, axis, wave, 0]
+            b = parts[table, axis, wave, 1] - parts[KEPT, axis, wave, 1]
+            total += state.share[table] * (a * cosine + b * sine)
+    return total
+
+
+@borrowing
+def _add_waves(learning: LearningArrays, axis: int, place: int, value: float) -> None:
+    """Count one row of the table that is written towards its waves."""
+    state, sums = learning.state[0], learning.parts[SUMS]
+    for wave in range(learning.cycles.shape[1]):
+        cycles = learning.cycles[axis, wave]
+        if cycles < 0:
+            continue
+        row, share = (cycles * place) % state.samples, (2.0 if cycles > 0 else 1.0) / state.samples
+        sums[axis, wave, 0] += share * value * learning.wave[0, row]
+        sums[axis, wave, 1] += share * value * learning.wave[1, row]
+
+
+@borrowing
+def _take_waves(learning: LearningArrays, source: int, goal: int) -> None:
+    """Copy parts of the waves; the sums begin anew."""
+    parts = learning.parts
+    for axis in range(5):
+        for wave in range(learning.cycles.shape[1]):
+            for i in range(2):
+                parts[goal, axis, wave, i] = parts[source, axis, wave, i]
+                if source == SUMS:
+                    parts[SUMS, axis, wave, i] = 0.0
 
 
 @borrowing
@@ -84,10 +151,14 @@ def look_ahead(learning: LearningArrays, control: ControlArrays, follows: bool) 
     """Tell the law what is to be fed forward at the sample that comes.
 
     ``follows`` tells that the sample belongs to the reference that repeats; it fades in and out.
+    What the internal model makes by then is left to it when another table takes over.
     """
     state, axes = learning.state[0], control.records[0].axes
     if follows and not state.follows:
         state.sample = state.recorded = 0
+        _take_waves(learning, state.used, KEPT)
+        for axis in range(5):
+            state.rests[axis] = 0
     state.follows = follows
     place = state.sample % state.samples
     for axis in range(5):
@@ -97,6 +168,9 @@ def look_ahead(learning: LearningArrays, control: ControlArrays, follows: bool) 
         state.share[table] += state.fading * (goal - state.share[table])
         for axis in range(5):
             axes[axis].learned += state.share[table] * learning.tables[table, place, axis]
+    for axis in range(5):
+        limit, fed = state.limit[axis], axes[axis].learned - _waves(learning, axis, place)
+        axes[axis].learned = min(max(fed, -limit), limit)
 
 
 @borrowing
@@ -112,7 +186,9 @@ def _write_next(learning: LearningArrays, place: int) -> None:
             shown += learning.kernels[0, m] * learning.made[row, axis]
             shown -= learning.kernels[1, m] * learning.error[row, axis]
         limit, value = state.limit[axis], known + gain * (shown - known)
-        learning.tables[state.next, place, axis] = min(max(value, -limit), limit)
+        limited = min(max(value, -limit), limit)
+        learning.tables[state.next, place, axis] = limited
+        _add_waves(learning, axis, place, limited)
 
 
 @borrowing
@@ -144,6 +220,7 @@ def _judge(learning: LearningArrays) -> None:
         state.best, state.score = state.used, min(score, state.score)
         for axis in range(5):
             state.least[axis] = state.sum[axis]
+    _take_waves(learning, SUMS, state.next)
     if state.flown >= state.passes:
         _end(state, DONE)
         return
@@ -164,6 +241,8 @@ def _record(learning: LearningArrays, control: ControlArrays, row: int) -> None:
         learning.error[row, axis] = error
         learning.made[row, axis] = sample.realised[axis] - known
         state.sum[axis] += error * error
+        if records.settings.rest_fades and state.sample * records.settings.period > SETTLED:
+            state.rests[axis] |= MOVED if each.rested < REST else RESTED
 
 
 @borrowing
@@ -190,4 +269,5 @@ def learn(learning: LearningArrays, control: ControlArrays) -> None:
                 _judge(learning)
             for axis in range(5):
                 state.sum[axis] = 0.0
+            _take_waves(learning, SUMS, SUMS)
     state.sample += 1
