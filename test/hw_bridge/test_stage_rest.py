@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from made_up import LOWER_STOP, active, watched
 
+from maglev_hw_bridge.sensing.guard_arrays import LOST
 from maglev_hw_bridge.stage import BridgeStage, Mode
 
 
@@ -252,3 +253,62 @@ def test_exactly_at_a_bound_it_has_not_slid_nor_leapt_nor_parked() -> None:
     place[1] = 1e-4
     assert not stage._slides()
     assert stage._parked_samples == 101  # so far in a sample is no leap
+
+
+def zeros(
+    stage: BridgeStage, y: float, above: list[float], still: list[int], lost: tuple[int, ...] = ()
+) -> str:
+    """What comes of no current so far above the lower stop [m]; of gaps, too, and their samples."""
+    watched(stage, LOWER_STOP - y)
+    stage.flying = True
+    state = stage.guard.arrays
+    state.believed[:4] = LOWER_STOP - np.array(above)
+    state.still[:] = still
+    state.trust[list(lost)] = LOST
+    stage.write(np.zeros(4), np.zeros(4))
+    assert stage.fault is not None
+    return stage.fault.kind
+
+
+@pytest.mark.parametrize(
+    ('y', 'above', 'still', 'kind'),
+    [
+        (5e-5, [0.0, 2.6e-5, 0.0, 2.3e-4], 100, 'encoder'),
+        (1.99e-4, [1.7e-5, 1.2e-4, 0.0, 1.2e-4], 300, 'encoder'),
+        (2.01e-4, [1.7e-5, 1.2e-4, 0.0, 1.2e-4], 300, 'controller'),
+        (5e-5, [0.0, 2.6e-5, 0.0, 2.3e-4], 99, 'controller'),
+        (5e-5, [0.0, 2.4e-5, 0.0, 2.3e-4], 300, 'controller'),
+        (5e-5, [1.9e-5, 1.2e-4, 0.0, 1.2e-4], 300, 'controller'),
+        (5e-5, [1.2e-4, 1.2e-4, 1.2e-4, 1.2e-4], 300, 'controller'),
+    ],
+)
+def test_gaps_that_hang_above_the_stop_when_a_landing_is_over_are_stuck(
+    y: float, above: list[float], still: int, kind: str
+) -> None:
+    stage, _ = active()
+    assert zeros(stage, y, above, [10, still, 10, still]) == kind
+    assert stage.guard.failed == ([1, 3] if kind == 'encoder' else [])
+    assert stage.fault is not None
+    assert ('encoder gap 2, gap 4 is stuck' in stage.fault.reason) == (kind == 'encoder')
+
+
+def test_one_that_hangs_is_landed_without() -> None:
+    stage, _ = active()
+    assert zeros(stage, 5e-5, [0.0, 0.0, 2e-4, 0.0], [200, 200, 300, 200]) == 'encoder'
+    assert stage.guard.blamed == [2]
+    assert stage.mode is Mode.LANDING
+
+
+def test_of_neighbours_that_hang_the_platen_is_let_go() -> None:
+    stage, _ = active()
+    assert zeros(stage, 5e-5, [0.0, 0.0, 2e-4, 2e-4], [200, 200, 300, 300]) == 'encoder'
+    assert stage.mode is Mode.DISABLED
+
+
+def test_what_is_done_without_neither_hangs_nor_rests() -> None:
+    stage, _ = active()
+    above = [0.0, 2e-4, 2e-4, 0.0]
+    assert zeros(stage, 5e-5, above, [200, 200, 300, 200], lost=(0, 1)) == 'encoder'
+    assert stage.guard.blamed == [2]
+    stage, _ = active()
+    assert zeros(stage, 5e-5, above, [200, 200, 300, 200], lost=(0, 3)) == 'controller'

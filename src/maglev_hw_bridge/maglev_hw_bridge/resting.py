@@ -11,6 +11,7 @@ from maglev_hw_bridge.drivers import Driver
 from maglev_hw_bridge.life_cycle import StageLife
 from maglev_hw_bridge.mode import Mode
 from maglev_hw_bridge.parameters import BridgeParameters
+from maglev_hw_bridge.sensing.guard_arrays import LOST
 
 _ON_THE_STOP, _AT_REST = 1.8e-5, 1e-2  # nearer the lower stop and slower it rests [m], [m/s]
 _NEAR, _STILL, _REST_TIME = 2e-4, 2e-5, 0.1  # so it does where it moves no more there [m, m, s]
@@ -18,6 +19,7 @@ _PARKED = 1e-4  # so far at most it moves along x and z in that time where it st
 _CREPT = 0.5  # what it moves in longer it crept, as under the pull of a cable [s]
 _SLIDING = 0.1  # faster it is moved, or homed [m/s]
 _CORNERS = np.array([[-1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, -1.0]])  # (5): gaps by phi, theta
+_HUNG = 2.5e-5  # a gap that far off the lower stop does not touch it [m]
 _LEFT, _SOON = 3e-4, 0.02  # what rested and is, or soon will be, farther off has left it [m], [s]
 
 
@@ -108,3 +110,18 @@ class RestingStage(StageLife):
         """
         still = self._still_samples * self.sample_time >= _REST_TIME
         return still or self._touches() or self._rests_at(np.min(self.guard.arrays.believed[:4]))
+
+    def _hung(self) -> list[int]:
+        """Gap encoders that hang above the lower stop, still for a while, with another one on it.
+
+        Where a controller wants no current any more, which lands by its own clock, the platen is
+        down and these are stuck; a landing by them would throw it up again.
+        """
+        state = self.guard.arrays
+        above, believed = self._lower_stop - state.believed[:4], state.trust[:4] != LOST
+        hung = believed & (above > _HUNG) & (self.sample_time * state.still >= _REST_TIME)
+        seated = believed & (above < _ON_THE_STOP)
+        near = self._lower_stop - state.position[0] < _NEAR
+        if near and seated.any() and np.all(hung | seated | ~believed):
+            return [int(i) for i in np.flatnonzero(hung)]
+        return []

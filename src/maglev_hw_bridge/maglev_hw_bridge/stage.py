@@ -185,7 +185,10 @@ class BridgeStage(RestingStage):
             self._raise_fault('stale', *faults.stale_fault(self._age * self.sample_time))
             return ''
         if self.flying and not flows and not self._on_the_stop():
-            self._raise_fault('controller', *faults.zero_fault(self.guard))
+            if hung := self._hung():
+                self._do_without(*hung)
+            else:
+                self._raise_fault('controller', *faults.zero_fault(self.guard))
             return ''
         code, index = self._drive(i_d, i_q)
         if code in (amplifiers.FINE, amplifiers.SPENT):
