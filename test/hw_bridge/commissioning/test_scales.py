@@ -18,8 +18,11 @@ COUNT = 1e-5
 NAMES = ('gap 1', 'gap 2', 'gap 3', 'gap 4', 'x', 'z')
 
 
-def prove(**given: object) -> EmulatedBoards:
-    """A machine with counts of 10 µm, homed in the middle, and what is said of it."""
+def prove(*, across: bool = False, **given: object) -> EmulatedBoards:
+    """A machine with counts of 10 µm, homed in the middle, and what is said of it.
+
+    ``across``: whether x is to see what z should, and the other way round.
+    """
     claimed = {'homing.x': 0.0, 'homing.z': 0.0}
     claimed |= {name.replace('__', '.'): value for name, value in given.items()}
     parameters = build(BridgeParameters, claimed)
@@ -35,7 +38,7 @@ def prove(**given: object) -> EmulatedBoards:
     driver.counts(counts[0])
     encoders.start(counts[0])
     encoders.home(counts[[0, 0]])
-    prove_scales(parameters, EmulatedPerson(boards, lambda _step: None), read)
+    assert prove_scales(parameters, EmulatedPerson(boards, lambda _step: None), read) == across
     driver.close()
     return boards
 
@@ -67,7 +70,7 @@ def test_shims_and_guides_need_not_be_exact(encoder: int, factor: float) -> None
 def test_exchanged_encoders_are_left_to_the_phases(pair: tuple[int, int]) -> None:
     channel = list(range(6))
     channel[pair[0]], channel[pair[1]] = channel[pair[1]], channel[pair[0]]
-    prove(encoder__channel=channel)
+    prove(encoder__channel=channel, across=pair == (4, 5))
 
 
 @pytest.mark.parametrize('encoder', range(6))

@@ -82,6 +82,7 @@ class Commissioning:
         self._amplifiers = Amplifiers(parameters)
         self._amplifiers.drive_phases(np.zeros(PHASES))  # compiled while no watchdog runs
         self._cooling_since = time.monotonic()
+        self._across = False  # x saw what z was to, and z what x was to
         self._fault: Fault | None = None  # latched since before, until all is well
 
     def run(self) -> None:
@@ -207,7 +208,7 @@ class Commissioning:
 
     def _scales(self) -> None:
         self._ask('move the platen by hand, to see what a count of each encoder is worth')
-        prove_scales(self._parameters, self._operator, self._lengths)
+        self._across = prove_scales(self._parameters, self._operator, self._lengths)
         self._tell('  every encoder sees what it is moved by')
 
     def _lengths(self) -> FloatArray:
@@ -228,6 +229,11 @@ class Commissioning:
                 return pulses.phase(phase)
 
         prove_phases(self._parameters, self._peak, self._operator, self._lengths, pulse, self._tell)
+        if self._across:
+            raise WrongError(
+                'pushed along X the platen moves along z: motors, gaps, x and z are all numbered '
+                '90 degrees round; check amplifier.channel and encoder.channel'
+            )
 
     def _first_lift_off(self) -> None:
         self._ask(

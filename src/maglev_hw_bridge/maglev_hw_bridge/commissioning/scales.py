@@ -21,10 +21,11 @@ _OFF = 5e-3  # the middle of the guides may read this [m]
 
 def prove_scales(
     parameters: BridgeParameters, operator: Operator, read: Callable[[], FloatArray]
-) -> None:
+) -> bool:
     """Have the operator move a platen that is homed; ``read`` gives the lengths (6,) [m].
 
-    Raises WrongError.
+    Returns whether x and z each saw what the other was to: exchanged, or with everything else
+    numbered 90 degrees round, which the phases tell. Raises WrongError.
     """
     rest = read()
     operator.act(Act.SHIMS)
@@ -33,23 +34,28 @@ def prove_scales(
     for index in range(4):
         _compare(index, abs(raised[index]), SHIM, 'on shims of that')
     machine = parameters.machine
+    across = True
     for index, stop, one, other in (
         (4, machine.x_max, Act.X_END, Act.X_OTHER_END),
         (5, machine.z_max, Act.Z_END, Act.Z_OTHER_END),
     ):
         operator.act(one)
-        first = read()[index]
+        at_first = read().copy()
         operator.act(other)
-        last = read()[index]
+        at_last = read().copy()
+        first, last = at_first[index], at_last[index]
         name = ENCODER_NAMES[index]
         seen = abs(last - first)
         _compare(index, seen, 2.0 * stop, f"twice 'machine.{name}_max' from end to end")
+        beside = abs(at_last[9 - index] - at_first[9 - index])
+        across &= seen <= _NOTHING * stop and beside > stop
         middle = 0.5 * (first + last)
         if seen > _NOTHING * stop and abs(middle) > _OFF:
             raise WrongError(
                 f'encoder {name} reads {middle * 1e3:.1f} mm in the middle of its guide: check '
                 f'homing.{name}, and the sign of element {index} of encoder.direction'
             )
+    return across
 
 
 def _compare(index: int, seen: float, length: float, what: str) -> None:
