@@ -5,6 +5,7 @@ from __future__ import annotations
 import _thread
 import ctypes
 import json
+import os
 import signal
 import sys
 from collections.abc import Callable, Sequence
@@ -386,14 +387,10 @@ def test_the_executable(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
 def test_it_asks_and_takes_no_for_an_answer(
     answers: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    left = iter(answers)
-
-    def answer(_prompt: str) -> str:
-        try:
-            return next(left)
-        except StopIteration as error:
-            raise EOFError from error
-
-    monkeypatch.setattr('builtins.input', answer)
-    assert run(['--params', str(PARAMS)]) == 130
+    typed, keyboard = os.pipe()
+    os.write(keyboard, ''.join(f'{answer}\n' for answer in answers).encode())
+    os.close(keyboard)
+    with open(typed, encoding='utf-8') as stdin:
+        monkeypatch.setattr('sys.stdin', stdin)
+        assert run(['--params', str(PARAMS)]) == 130
     assert 'stopped' in capsys.readouterr().err
