@@ -79,11 +79,17 @@ def test_a_stop_during_another_landing_has_its_longest_time_from_then_on(
     assert 'not down' in cut(stage)
 
 
-def test_what_is_found_out_meanwhile_gives_a_stop_no_more_time() -> None:
+def stopped_as_long_as_may_be() -> BridgeStage:
+    """One that has landed since an emergency stop for as long as it may."""
     stage, _ = active(boards__stop_time=STOP_TIME)
     aloft(stage)
     stage.stop('for a test')
     descend(stage, LONGEST)
+    return stage
+
+
+def test_what_is_found_out_meanwhile_gives_a_stop_no_more_time() -> None:
+    stage = stopped_as_long_as_may_be()
     stage.guard.arrays.trust[:2] = LOST
     stage.guard.arrays.blamed[:2] = 1
     stage._sensing_fault(guard.STUCK, 0)
@@ -92,10 +98,7 @@ def test_what_is_found_out_meanwhile_gives_a_stop_no_more_time() -> None:
 
 
 def test_the_next_landing_is_for_no_stop_of_the_last_flight() -> None:
-    stage, _ = active(boards__stop_time=STOP_TIME)
-    aloft(stage)
-    stage.stop('for a test')
-    descend(stage, LONGEST)
+    stage = stopped_as_long_as_may_be()
     stage._disable()
     stage.read()
     assert stage.reset()[0]

@@ -135,15 +135,22 @@ def _add_waves(learning: LearningArrays, axis: int, place: int, value: float) ->
 
 
 @borrowing
-def _take_waves(learning: LearningArrays, source: int, goal: int) -> None:
-    """Copy parts of the waves; the sums begin anew."""
+def _copy_waves(learning: LearningArrays, source: int, goal: int) -> None:
     parts = learning.parts
     for axis in range(5):
         for wave in range(learning.cycles.shape[1]):
             for i in range(2):
                 parts[goal, axis, wave, i] = parts[source, axis, wave, i]
-                if source == SUMS:
-                    parts[SUMS, axis, wave, i] = 0.0
+
+
+@borrowing
+def _begin_sums(learning: LearningArrays) -> None:
+    """A pass ends: errors, and the waves of the table that is written, count anew."""
+    for axis in range(5):
+        learning.state[0].sum[axis] = 0.0
+        for wave in range(learning.cycles.shape[1]):
+            for i in range(2):
+                learning.parts[SUMS, axis, wave, i] = 0.0
 
 
 @borrowing
@@ -156,7 +163,7 @@ def look_ahead(learning: LearningArrays, control: ControlArrays, follows: bool) 
     state, axes = learning.state[0], control.records[0].axes
     if follows and not state.follows:
         state.sample = state.recorded = 0
-        _take_waves(learning, state.used, KEPT)
+        _copy_waves(learning, state.used, KEPT)
         for axis in range(5):
             state.rests[axis] = 0
     state.follows = follows
@@ -220,7 +227,7 @@ def _judge(learning: LearningArrays) -> None:
         state.best, state.score = state.used, min(score, state.score)
         for axis in range(5):
             state.least[axis] = state.sum[axis]
-    _take_waves(learning, SUMS, state.next)
+    _copy_waves(learning, SUMS, state.next)
     if state.flown >= state.passes:
         _end(state, DONE)
         return
@@ -267,7 +274,5 @@ def learn(learning: LearningArrays, control: ControlArrays) -> None:
         elif ended:
             if state.recorded > state.samples:
                 _judge(learning)
-            for axis in range(5):
-                state.sum[axis] = 0.0
-            _take_waves(learning, SUMS, SUMS)
+            _begin_sums(learning)
     state.sample += 1
