@@ -14,7 +14,7 @@ from maglev_model.contract.wire import Incoming
 from maglev_msgs.msg import Measurement
 from maglev_node.stage_parameters import ClockedStageParameters
 from maglev_node.stamp import nanoseconds, set_stamp
-from maglev_node.topics import KEYS, PROGRESS, SAMPLE_TOPICS
+from maglev_node.topics import CURRENTS, KEYS, PROGRESS, SAMPLE_TOPICS
 
 KEYS_OF_KINDS = {kind: KEYS[topic] for topic, kind in SAMPLE_TOPICS.items()}
 
@@ -91,6 +91,7 @@ class MadeUpNode:
         self.fail = self.failed.append
         self.inbox = Inbox(self.stamped)
         self.subscribers: dict[str, list[str]] = {}
+        self.hears: dict[str, Callable[[Any], None]] = {}  # all but the currents, by topic
         self.controllers = 0  # that publish currents
 
     def get_namespace(self) -> str:
@@ -110,9 +111,12 @@ class MadeUpNode:
         return self.topics.setdefault(message_type, Topic(message_type))
 
     def create_subscription(
-        self, _type: type, _topic: str, callback: Any, _qos: Any, *, raw: bool
+        self, _type: type, topic: str, callback: Any, _qos: Any, *, raw: bool
     ) -> Any:
         assert raw
+        if topic != CURRENTS:
+            self.hears[topic] = lambda message: callback(serialize_message(message))
+            return SimpleNamespace()
         self.answer = lambda message: callback(serialize_message(self.stamped(message)))
         return SimpleNamespace(
             topic_name='/stage/currents', get_publisher_count=lambda: self.controllers

@@ -66,7 +66,8 @@ class SourceParameters(NodeParameters):
     )
     watchers: tuple[str, ...] = parameter(
         (),
-        'names of nodes in this namespace that watch every sample, waited for at start',
+        'names of nodes in this namespace that watch every sample, waited for at start, and in'
+        ' lockstep where they tell on NAME/progress that they are behind',
         read_only=True,
     )
 

@@ -75,7 +75,8 @@ def hear(node: Node, topic: str, callback: Callable[[Any], None]) -> Subscriptio
         if sample is not None:
             callback(sample)
 
-    return node.create_subscription(SAMPLE_TOPICS[topic], topic, take, sample_qos(), raw=True)
+    message_type = SAMPLE_TOPICS[sampled(topic)]
+    return node.create_subscription(message_type, topic, take, sample_qos(), raw=True)
 
 
 class SampleQueue:

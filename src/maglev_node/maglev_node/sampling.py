@@ -8,6 +8,7 @@ from typing import Any, Generic, TypeVar
 
 from maglev_model.contract.controller_watch import NOBODY, ControllerWatch, Verdict
 from maglev_model.contract.stage import EncoderSample, Fault, Stage, StageError
+from maglev_node.in_step import InStep
 from maglev_node.managed_node import ManagedNode
 from maglev_node.pacing import Deadlines, Pace, StageClock
 from maglev_node.sample_publisher import SamplePublisher
@@ -16,7 +17,9 @@ from maglev_node.stage_parameters import ClockedStageParameters, StageNodeParame
 from maglev_node.topics import CURRENTS
 
 _REPEAT_PERIOD = 0.02
-"""How often lockstep looks whether an answer is overdue, and repeats the first sample [s]."""
+"""How often lockstep looks whether an answer is overdue or a watcher has caught up [s].
+
+And repeats the first sample."""
 
 _REMEDY = 'see to the controller, and that it is the only one'
 
@@ -28,7 +31,8 @@ class Sampling(Generic[P, S]):
     """Takes a stage's samples from :meth:`start` to :meth:`stop`; again after another start.
 
     Lockstep: the first sample is repeated until a controller answers it, and at rest the one that
-    waits when controllers came or went; else each waits for the currents with its sequence number.
+    waits when controllers came or went; else each waits for the currents with its sequence number,
+    and for those who watch, not to lose any (:class:`~maglev_node.in_step.InStep`).
     Real time: a sample every sample time, with the newest currents, hence one sample of delay.
     Whose currents are followed, and from when on, is for the
     :class:`~maglev_model.contract.controller_watch.ControllerWatch` to say; what it refuses in
@@ -51,11 +55,13 @@ class Sampling(Generic[P, S]):
         self._publisher = SamplePublisher(node, stage.sample_time, truth=stage.truth() is not None)
         self._answers: Any = None
         self._controllers = 0  # how many there were when one answered first
+        self._ahead = -1  # sample that is answered and waits for those who watch
         self._pace: Pace = StageClock(stage.sample_time)
         if not stage.paced:
             self._pace = Deadlines(stage.sample_time)
         if node.parameters.mode == 'lockstep':
             self._answers = hear(node, CURRENTS, self._on_answer)
+            self._in_step = InStep(node, node.parameters.watchers)
         else:
             self._currents = SampleQueue(node, CURRENTS)
 
@@ -96,6 +102,7 @@ class Sampling(Generic[P, S]):
         self._publisher.destroy()
         if self._answers is not None:
             self._node.destroy_subscription(self._answers)
+            self._in_step.destroy()
         else:
             self._currents.raw.destroy()
 
@@ -146,20 +153,29 @@ class Sampling(Generic[P, S]):
         if self._timer is None or not (self.answered or self._publisher.watchers.there()):
             return
         verdict = self._judge(message)
-        if message.sequence == self.sequence and verdict is not Verdict.ELSEWHERE:
+        expected = message.sequence == self.sequence != self._ahead
+        if expected and verdict is not Verdict.ELSEWHERE:
             if not self.answered:
                 self.answered, self._controllers = True, self._answers.get_publisher_count()
             if verdict is Verdict.FOLLOWED:
                 self._write(message)
             else:
                 self._hold()
-            self._advance()
+            self._ahead = self.sequence
+            self._advance_in_step()
         if verdict is Verdict.REFUSED and self.controller.gave_up:  # it may not answer any more
             self._go_on_alone()
             self.answered = not self.stage.restartable
 
+    def _advance_in_step(self) -> None:
+        if not self._in_step.waits(self.sequence):
+            self._advance()
+
     def _watch_answers(self) -> None:
         if not self._ticks:
+            return
+        if self._ahead == self.sequence:
+            self._advance_in_step()
             return
         waited = time.monotonic() - self._sample_time
         if not self.stage.flying and self._controllers != self._answers.get_publisher_count():

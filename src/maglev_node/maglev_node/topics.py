@@ -38,6 +38,12 @@ KEYS = {
 PROGRESS = {STAGE_PROGRESS: MEASUREMENT, CONTROLLER_PROGRESS: CONTROLLER_STATE}
 """The topics for whoever need not hear of every sample, with those they are taken from."""
 
+
+def progress_of(watcher: str) -> str:
+    """The topic on which a node that watches tells the newest measurement it has taken."""
+    return f'{watcher}{PROGRESS_SUFFIX}'
+
+
 PROGRESS_PERIOD = 16
 """Samples from one message on them to the next, in flight."""
 
@@ -47,7 +53,9 @@ SILENCE = {'lockstep': 2.0, 'realtime': 0.5}
 
 def sampled(topic: str) -> str:
     """The sample topic whose messages are on a topic: itself, but for those of progress."""
-    return PROGRESS.get(topic, topic)
+    if topic.endswith(PROGRESS_SUFFIX):
+        return PROGRESS.get(topic, MEASUREMENT)
+    return topic
 
 
 def sample_qos(depth: int = KEPT['lockstep']) -> QoSProfile:

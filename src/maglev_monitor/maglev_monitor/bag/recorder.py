@@ -28,8 +28,8 @@ from maglev_monitor.bag.log_time import LogTimes
 from maglev_monitor.bag.writer import BagWriter
 from maglev_node.node import NodeError
 from maglev_node.polling import PolledSubscription
-from maglev_node.topics import DIAGNOSTICS, MEASUREMENT, SAMPLE_TOPICS
-from maglev_node.watcher import WatcherNode, WatcherParameters
+from maglev_node.topics import DIAGNOSTICS, MEASUREMENT, SAMPLE_TOPICS, progress_of
+from maglev_node.watcher import PROGRESS_TOLD, WatcherNode, WatcherParameters
 
 TOPICS: dict[str, type] = {
     **SAMPLE_TOPICS,
@@ -62,7 +62,10 @@ class RecorderParameters(WatcherParameters):
 class RecorderNode(WatcherNode[RecorderParameters]):
     """Takes the raw messages of all topics in bursts and writes them to a bag."""
 
-    interface: ClassVar[Mapping[str, str]] = dict.fromkeys(TOPICS, 'subscribed: each message')
+    interface: ClassVar[Mapping[str, str]] = {
+        **dict.fromkeys(TOPICS, 'subscribed: each message'),
+        progress_of('recorder'): PROGRESS_TOLD,
+    }
 
     def __init__(self) -> None:
         super().__init__('recorder', RecorderParameters)
@@ -115,16 +118,18 @@ class RecorderNode(WatcherNode[RecorderParameters]):
         if self._failed:
             return
         try:
+            measured: list[bytes] = []
             for topic, tap in self._taps.items():
                 taken = list(tap.take())
                 if topic == MEASUREMENT:
-                    self.adapt_priority(message for message, _ in taken)
+                    measured = [message for message, _ in taken]
                 messages = self._log_times.of(type_name(TOPICS[topic]), taken)
                 if not messages:
                     continue
                 if tap.topic not in self._writer.counts:
                     self._add_topic(tap.topic, TOPICS[topic])
                 self._writer.write(tap.topic, messages)
+            self.keep_step(measured)
             now = time.monotonic()
             if now - self._flushed > self.parameters.flush_period:
                 self._flushed = now

@@ -21,8 +21,8 @@ from maglev_node import topics
 from maglev_node.node import NodeError
 from maglev_node.polling import PolledSubscription
 from maglev_node.stamp import nanoseconds
-from maglev_node.topics import KEYS
-from maglev_node.watcher import WatcherNode, WatcherParameters
+from maglev_node.topics import KEYS, progress_of
+from maglev_node.watcher import PROGRESS_TOLD, WatcherNode, WatcherParameters
 
 _POLL_PERIOD = 0.05
 
@@ -40,7 +40,10 @@ class MonitorParameters(WatcherParameters, WatchParameters):
 class MonitorNode(WatcherNode[MonitorParameters]):
     """Takes the samples of all topics in bursts; polls, so that the loop keeps the cores."""
 
-    interface: ClassVar[Mapping[str, str]] = dict.fromkeys(KEYS, 'subscribed: each sample')
+    interface: ClassVar[Mapping[str, str]] = {
+        **dict.fromkeys(KEYS, 'subscribed: each sample'),
+        progress_of('monitor'): PROGRESS_TOLD,
+    }
 
     def __init__(self) -> None:
         super().__init__('monitor', MonitorParameters)
@@ -102,12 +105,12 @@ class MonitorNode(WatcherNode[MonitorParameters]):
         if self._concluded:
             return
         arrived = self._arrived()
-        self.adapt_priority(arrived[KEYS[topics.MEASUREMENT]])
         try:
             self._watch.add(arrived)
         except DecodeError as error:
             self._stop_watching(str(error))
             return
+        self.keep_step(arrived[KEYS[topics.MEASUREMENT]])
         if self._watch.over(time.monotonic()):
             verdict = self._conclude()
             if self.parameters.exit_at_end:
