@@ -14,7 +14,7 @@ from maglev_node.managed_node import ManagedNode
 from maglev_node.node import NodeError
 from maglev_node.sampling import Sampling
 from maglev_node.stage_parameters import StageNodeParameters
-from maglev_node.topics import CLOCK, CURRENTS, MEASUREMENT, STAGE_PROGRESS
+from maglev_node.topics import CLOCK, CURRENTS, MEASUREMENT, STAGE_PROGRESS, progress_of
 
 P = TypeVar('P', bound=StageNodeParameters)
 S = TypeVar('S', bound=Stage)
@@ -33,6 +33,10 @@ class StageNode(ManagedNode[P], Generic[P, S]):
         STAGE_PROGRESS: 'published: the same, in flight every sixteenth',
         CURRENTS: 'subscribed: the currents that answer a sample',
         CLOCK: 'published in lockstep: stage time',
+        **dict.fromkeys(
+            map(progress_of, ('recorder', 'monitor')),
+            'subscribed in lockstep, where watchers names it: how far it is',
+        ),
         '~/emergency_stop': "std_srvs/Trigger: latch a fault, see the fault's remedy",
         '~/reset': 'std_srvs/Trigger: clear a fault',
         '~/change_state': 'lifecycle_msgs/ChangeState, with the other life-cycle services',
