@@ -32,7 +32,7 @@ from maglev_plant.effects.heat import warm_factors
 from maglev_plant.effects.modes import carry_modes
 from maglev_plant.effects.motors import add_motor_forces
 from maglev_plant.effects.winding import carry_currents, flowing_currents
-from maglev_plant.stops import apply_stops
+from maglev_plant.stops import apply_coupled_stops, apply_stops
 
 
 @borrowing
@@ -168,7 +168,10 @@ def _carry_platen(
     _runge_kutta(stage, machine, time, current, work)
     if effects.friction.set_valued:
         apply_coulomb(effects.friction, effects.balance.inverse, before, stage.state, stage.step)
-    apply_stops(stage, before)
+    if effects.balance.coupled:
+        apply_coupled_stops(stage, before, work[4])
+    else:
+        apply_stops(stage, before)
     carry_bristles(effects.friction, before, stage.state, stage.step)
     carry_modes(effects.modes, before, stage.state, stage.step)
 

@@ -29,6 +29,10 @@ class BalanceArrays(Record):
     inverse: Annotated[FloatArray, 5, 5]  # of the mass matrix of the free axes
     torque: Annotated[FloatArray, 5]  # of the weight, level [N, N m]
     pendulum: float  # M_y G h [N m]
+    coupled: bool  # whether tilts and displacements are
+    slide_x: float  # that x takes on by theta where nothing else pushes it, M_x,theta / M_x [m]
+    slide_z: float  # z by phi
+    impulse: Annotated[FloatArray, 16]  # of the stops at the last contact, by their faces [N s]
 
 
 def mass_matrix(parameters: PlantParameters, machine: Machine) -> FloatArray:
@@ -63,6 +67,10 @@ def balance_arrays(parameters: PlantParameters, machine: Machine) -> BalanceArra
         inverse=inverse,
         torque=np.array([weight, 0.0, 0.0, -weight * balance.aside_z, weight * balance.aside_x]),
         pendulum=weight * balance.below,
+        coupled=bool(np.any(inverse != np.diag(np.diag(inverse)))),
+        slide_x=0.0 if parameters.guide.locked[X] else matrix[X, THETA] / matrix[X, X],
+        impulse=np.zeros(16),
+        slide_z=0.0 if parameters.guide.locked[Z] else matrix[Z, PHI] / matrix[Z, Z],
     )
 
 
