@@ -5,6 +5,10 @@ are stuck the controller leaves the platen where they do not show, and within fr
 others nor the model can tell. So all gaps at once are knocked, by a push along y to and fro, softly
 first, then twice as hard, and again. Sound ones may be silent together too, most of all where
 guides stick: each time all have answered, they are given twice as long.
+
+Of a machine with a single motor, which guides keep level, every gap shows y. There the controller
+goes astray only by all of them, so all must be silent, one that answers is enough, and they are
+asked more softly at first.
 """
 
 from __future__ import annotations
@@ -20,6 +24,7 @@ from maglev_model.machine import Machine, machine_constants
 from maglev_model.platen import output_accelerations
 
 _KNOCKS, _GROWTH = 3, 2.0
+_KNOCKS_FOR_ANY, _GROWTH_FOR_ANY = 8, 1.5  # where one answer is enough
 _OPPOSITE = 2.0  # times the patience with others: two gaps of one tilt are silent together for long
 _MOST_PATIENT = 128.0  # times that of the beginning, however often they have answered
 
@@ -40,12 +45,12 @@ class GapKnock:
         self._patience = round(parameters.fault.gap_silence / parameters.sample_time)
         self._limit = parameters.fault.largest_amplitude
         self._machine = machine_constants(parameters.machine)
+        self._any = parameters.machine.motors == 1  # whether one gap that answers is enough
         count = max(parameters.encoder.resolution[:4])
         self._pushes = Pushes(
             hardest_push(parameters, Y, count),
             samples_to_push(parameters.sample_time),
-            _KNOCKS,
-            _GROWTH,
+            *((_KNOCKS_FOR_ANY, _GROWTH_FOR_ANY) if self._any else (_KNOCKS, _GROWTH)),
         )
         self._asked: tuple[int, ...] = ()
         self._samples = 0  # since they are
@@ -64,7 +69,8 @@ class GapKnock:
             self._ask(watched)
             return ()
         self._samples += 1
-        if self._pushes.go_on(not self._silent(watched, self._samples, self._asked)):
+        silent = self._silent(watched, self._samples, self._asked)
+        if self._pushes.go_on(not silent or (self._any and len(silent) < len(self._asked))):
             return self._silent(watched, self._samples)
         if not self._pushes.under_way:
             self._answered[self._opposite] += 1
@@ -79,8 +85,8 @@ class GapKnock:
         return tuple(i for i in gaps if silent[i] >= samples and trust[i] != LOST)
 
     def _ask(self, watched: GuardArrays) -> None:
-        """Begin to knock where two or more have been silent for too long."""
-        if sorted(watched.silent[:4].tolist())[2] < self._patience:  # at most one
+        """Begin to knock where two or more, or all, have been silent for too long."""
+        if sorted(watched.silent[:4].tolist())[0 if self._any else 2] < self._patience:
             return
         for opposite in (False, True):
             silent = self._silent(watched, self.patience(opposite))

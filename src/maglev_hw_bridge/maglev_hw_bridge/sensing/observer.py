@@ -92,10 +92,18 @@ def _foretell(o: ObserverArrays) -> None:
 
 
 @borrowing
+def _single(o: ObserverArrays) -> bool:
+    """Whether the machine has one motor, and moves in y and x alone."""
+    return bool(machine_from_array(o.machine).motors == 1.0)
+
+
+@borrowing
 def start(o: ObserverArrays, length: FloatArray) -> None:
     """Begin at rest where the encoders (6,) [m] say."""
     machine = machine_from_array(o.machine)
     outputs_from_gaps(machine, length[:4], length[4], length[5], o.position)
+    if _single(o):
+        o.position[PHI] = o.position[THETA] = 0.0
     for axis in range(5):
         o.rate[axis] = o.disturbance[axis] = 0.0
         o.model_rate[axis] = o.least_rate[axis] = 0.0
@@ -229,7 +237,7 @@ def _correct_vertical(o: ObserverArrays, innovation: FloatArray, used: Flags) ->
     """Correct y and the tilts by the gaps.
 
     Two gaps of one pair tell y and their tilt; with less, phi, which its spring keeps near zero, is
-    left to the model first.
+    left to the model first. Of a machine with a single motor guides keep the tilts.
     """
     r = machine_from_array(o.machine).r
     along_z, along_x = int(used[0]) + int(used[2]), int(used[1]) + int(used[3])
@@ -246,6 +254,8 @@ def _correct_vertical(o: ObserverArrays, innovation: FloatArray, used: Flags) ->
     if along_x == 1:
         tilt_x += -y if used[1] else y
     _amend(o, Y, y)
+    if _single(o):
+        return
     if along_z == 2 or (along_z == 1 and along_x == 2):
         _amend(o, PHI, tilt_z / (along_z * r))
     if along_x == 2 or (along_x == 1 and along_z > 0):
