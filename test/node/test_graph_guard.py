@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from maglev_node import graph_guard
-from maglev_node.graph_guard import GraphGuard, node_of
+from maglev_node.graph_guard import GraphGuard, Watchers, node_of
 from maglev_node.node import NodeError
 from maglev_node.place import Place
 
@@ -206,3 +206,11 @@ def test_a_place_is_free_when_its_process_is_killed() -> None:
         other.kill()
     assert place.take('here')
     place.leave()
+
+
+@pytest.mark.parametrize('name', ['my-node', '/recorder', '2nd', ''])
+def test_a_name_that_no_node_can_have_is_not_waited_for(name: str) -> None:
+    made_up: Any = Node()
+    with pytest.raises(NodeError, match=f"'watchers' is .*'recorder', '{name}'.* is no name"):
+        Watchers(made_up, ('recorder', name), 'reference')
+    Watchers(made_up, ('recorder', '_hidden', 'my_2nd'), 'reference')

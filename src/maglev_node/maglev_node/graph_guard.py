@@ -7,9 +7,11 @@ import time
 from collections.abc import Callable, Iterable
 from typing import Any
 
+from rclpy.exceptions import InvalidNodeNameException
 from rclpy.node import Node
 from rclpy.timer import Timer
 from rclpy.topic_endpoint_info import TopicEndpointInfo
+from rclpy.validate_node_name import validate_node_name
 
 from maglev_node import dds
 from maglev_node.node import MaglevNode, NodeError
@@ -132,7 +134,17 @@ class Watchers:
     """
 
     def __init__(self, node: Node, names: Iterable[str], *topics: str) -> None:
-        self._node, self._names, self._topics = node, tuple(names), topics
+        """Raises NodeError for what cannot be the name of a node."""
+        names = tuple(names)
+        for name in names:
+            try:
+                validate_node_name(name)
+            except InvalidNodeNameException as error:
+                raise NodeError(
+                    f"parameter 'watchers' is {list(names)}, and {name!r} is no name of a node:"
+                    ' letters, digits and underscores, without its namespace'
+                ) from error
+        self._node, self._names, self._topics = node, names, topics
         self._since: dict[tuple[str, str], float] = {}  # that a name subscribes to a topic [s]
         self._reminded = time.monotonic()
 
