@@ -31,7 +31,7 @@ def ranks():
 
 seen = [ranks()]
 for messages in json.loads(sys.argv[1]):
-    node.keep_step([bytes.fromhex(message) for message in messages])
+    node.acknowledge([bytes.fromhex(message) for message in messages])
     seen.append(ranks())
 node.close()
 seen.append(ranks())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -36,11 +37,10 @@ def faces(radius: float) -> tuple[Array, Array]:
     """The set of platen positions as ``A q ≤ b``."""
     rows = [*np.eye(5), *-np.eye(5)]
     bounds = [*UPPER, *-LOWER]
-    for sign, bound in ((1.0, UPPER[0]), (-1.0, -LOWER[0])):
-        for tilt in (3, 4, 3, 4):
-            rows.append(np.array([sign, 0.0, 0.0, 0.0, 0.0]))
-            rows[-1][tilt] = radius if len(rows) % 4 < 2 else -radius
-            bounds.append(bound)
+    for up, tilt, side in product((1.0, -1.0), (3, 4), (1.0, -1.0)):
+        rows.append(np.array([up, 0.0, 0.0, 0.0, 0.0]))
+        rows[-1][tilt] = side * radius
+        bounds.append(UPPER[0] if up > 0.0 else -LOWER[0])
     return np.array(rows), np.array(bounds)
 
 
@@ -95,7 +95,7 @@ def test_a_step_ends_at_the_nearest_point_and_gains_nothing(
     before, state = np.zeros(10), arrays.state
     before[::2], before[1::2] = start, velocity
     state[::2], state[1::2] = wanted, velocity
-    arrays.effects.balance.impulse[:] = rng.exponential(0.1, 16) * (rng.random(16) > 0.5)
+    arrays.stop_impulse[:] = rng.exponential(0.1, 16) * (rng.random(16) > 0.5)
     apply_coupled_stops(arrays.block[0], before, np.zeros(10))
     a_, b_ = faces(radius)
     assert np.max(a_ @ state[::2] - b_) < 1e-12

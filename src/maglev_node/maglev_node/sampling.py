@@ -8,7 +8,7 @@ from typing import Any, Generic, TypeVar
 
 from maglev_model.contract.controller_watch import NOBODY, ControllerWatch, Verdict
 from maglev_model.contract.stage import EncoderSample, Fault, Stage, StageError
-from maglev_node.in_step import InStep
+from maglev_node.flow_control import FlowControl
 from maglev_node.managed_node import ManagedNode
 from maglev_node.pacing import Deadlines, Pace, StageClock
 from maglev_node.sample_publisher import SamplePublisher
@@ -32,7 +32,7 @@ class Sampling(Generic[P, S]):
 
     Lockstep: the first sample is repeated until a controller answers it, and at rest the one that
     waits when controllers came or went; else each waits for the currents with its sequence number,
-    and for those who watch, not to lose any (:class:`~maglev_node.in_step.InStep`).
+    and for those who watch, not to lose any (:class:`~maglev_node.flow_control.FlowControl`).
     Real time: a sample every sample time, with the newest currents, hence one sample of delay.
     Whose currents are followed, and from when on, is for the
     :class:`~maglev_model.contract.controller_watch.ControllerWatch` to say; what it refuses in
@@ -55,13 +55,13 @@ class Sampling(Generic[P, S]):
         self._publisher = SamplePublisher(node, stage.sample_time, truth=stage.truth() is not None)
         self._answers: Any = None
         self._controllers = 0  # how many there were when one answered first
-        self._ahead = -1  # sample that is answered and waits for those who watch
+        self._held_at = -1  # sample that is answered and waits for those who watch
         self._pace: Pace = StageClock(stage.sample_time)
         if not stage.paced:
             self._pace = Deadlines(stage.sample_time)
         if node.parameters.mode == 'lockstep':
             self._answers = hear(node, CURRENTS, self._on_answer)
-            self._in_step = InStep(node, node.parameters.watchers)
+            self._flow_control = FlowControl(node, node.parameters.watchers)
         else:
             self._currents = SampleQueue(node, CURRENTS)
 
@@ -102,7 +102,7 @@ class Sampling(Generic[P, S]):
         self._publisher.destroy()
         if self._answers is not None:
             self._node.destroy_subscription(self._answers)
-            self._in_step.destroy()
+            self._flow_control.destroy()
         else:
             self._currents.raw.destroy()
 
@@ -153,7 +153,7 @@ class Sampling(Generic[P, S]):
         if self._timer is None or not (self.answered or self._publisher.watchers.there()):
             return
         verdict = self._judge(message)
-        expected = message.sequence == self.sequence != self._ahead
+        expected = message.sequence == self.sequence != self._held_at
         if expected and verdict is not Verdict.ELSEWHERE:
             if not self.answered:
                 self.answered, self._controllers = True, self._answers.get_publisher_count()
@@ -161,21 +161,21 @@ class Sampling(Generic[P, S]):
                 self._write(message)
             else:
                 self._hold()
-            self._ahead = self.sequence
-            self._advance_in_step()
+            self._held_at = self.sequence
+            self._advance_within_window()
         if verdict is Verdict.REFUSED and self.controller.gave_up:  # it may not answer any more
             self._go_on_alone()
             self.answered = not self.stage.restartable
 
-    def _advance_in_step(self) -> None:
-        if not self._in_step.waits(self.sequence):
+    def _advance_within_window(self) -> None:
+        if not self._flow_control.holds(self.sequence):
             self._advance()
 
     def _watch_answers(self) -> None:
         if not self._ticks:
             return
-        if self._ahead == self.sequence:
-            self._advance_in_step()
+        if self._held_at == self.sequence:
+            self._advance_within_window()
             return
         waited = time.monotonic() - self._sample_time
         if not self.stage.flying and self._controllers != self._answers.get_publisher_count():

@@ -47,7 +47,7 @@ class WatcherNode(MaglevNode[P]):
         self._adapted = False
         self._progress: Any = None  # publisher, in lockstep
 
-    def keep_step(self, taken: Sequence[bytes]) -> None:
+    def acknowledge(self, taken: Sequence[bytes]) -> None:
         """Tell the stage the last of the serialized measurements that were ``taken``, if any.
 
         The first that can be read tells the mode of the stage, to which the process adapts.

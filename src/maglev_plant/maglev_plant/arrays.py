@@ -57,6 +57,7 @@ class StageArrays(Record):
     upper: Annotated[FloatArray, 5]
     seat_radius: float  # [m]
     gyration: float  # √(I_x / M_y) [m]
+    stop_impulse: Annotated[FloatArray, 16]  # of the last contact, by faces, see ``stops`` [N s]
 
     sample: int  # number of samples so far
     state: Annotated[FloatArray, 10]  # x1..x10

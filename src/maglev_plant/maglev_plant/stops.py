@@ -183,7 +183,7 @@ def _agree(stage: StageArrays, before: FloatArray) -> None:
 
     Beginning with what they gave at the step before: a platen at rest takes the same from them.
     """
-    inverse, impulse = stage.effects.balance.inverse, stage.effects.balance.impulse
+    inverse, impulse = stage.effects.balance.inverse, stage.stop_impulse
     furthest = 0.0
     for face in range(_FACES):
         furthest = max(furthest, _outside(stage, face, before, stage.step))
@@ -215,7 +215,7 @@ def apply_coupled_stops(stage: StageArrays, before: FloatArray, free: FloatArray
         state[i - 1] = before[i - 1] + stage.step * state[i]
     apply_stops(stage, before)
     for axis, tilt, slide in ((X, THETA, balance.slide_x), (Z, PHI, balance.slide_z)):
-        if balance.impulse[2 * (axis - X)] + balance.impulse[2 * (axis - X) + 1] == 0.0:
+        if stage.stop_impulse[2 * (axis - X)] + stage.stop_impulse[2 * (axis - X) + 1] == 0.0:
             turned = state[2 * tilt + 1] - free[2 * tilt + 1]
             state[2 * axis + 1] = free[2 * axis + 1] - slide * turned
             state[2 * axis] = before[2 * axis] + stage.step * state[2 * axis + 1]

@@ -24,7 +24,7 @@ from maglev_model.machine import Machine, machine_constants
 from maglev_model.platen import output_accelerations
 
 _KNOCKS, _GROWTH = 3, 2.0
-_KNOCKS_FOR_ANY, _GROWTH_FOR_ANY = 8, 1.5  # where one answer is enough
+_KNOCKS_FOR_ONE, _GROWTH_FOR_ONE = 8, 1.5  # where one answer is enough
 _OPPOSITE = 2.0  # times the patience with others: two gaps of one tilt are silent together for long
 _MOST_PATIENT = 128.0  # times that of the beginning, however often they have answered
 
@@ -45,12 +45,12 @@ class GapKnock:
         self._patience = round(parameters.fault.gap_silence / parameters.sample_time)
         self._limit = parameters.fault.largest_amplitude
         self._machine = machine_constants(parameters.machine)
-        self._any = parameters.machine.motors == 1  # whether one gap that answers is enough
+        self._one_is_enough = parameters.machine.motors == 1  # that answers, for all gaps show y
         count = max(parameters.encoder.resolution[:4])
         self._pushes = Pushes(
             hardest_push(parameters, Y, count),
             samples_to_push(parameters.sample_time),
-            *((_KNOCKS_FOR_ANY, _GROWTH_FOR_ANY) if self._any else (_KNOCKS, _GROWTH)),
+            *((_KNOCKS_FOR_ONE, _GROWTH_FOR_ONE) if self._one_is_enough else (_KNOCKS, _GROWTH)),
         )
         self._asked: tuple[int, ...] = ()
         self._samples = 0  # since they are
@@ -70,7 +70,8 @@ class GapKnock:
             return ()
         self._samples += 1
         silent = self._silent(watched, self._samples, self._asked)
-        if self._pushes.go_on(not silent or (self._any and len(silent) < len(self._asked))):
+        enough = 1 if self._one_is_enough else len(self._asked)
+        if self._pushes.go_on(len(self._asked) - len(silent) >= enough):
             return self._silent(watched, self._samples)
         if not self._pushes.under_way:
             self._answered[self._opposite] += 1
@@ -86,7 +87,7 @@ class GapKnock:
 
     def _ask(self, watched: GuardArrays) -> None:
         """Begin to knock where two or more, or all, have been silent for too long."""
-        if sorted(watched.silent[:4].tolist())[0 if self._any else 2] < self._patience:
+        if sorted(watched.silent[:4].tolist())[0 if self._one_is_enough else 2] < self._patience:
             return
         for opposite in (False, True):
             silent = self._silent(watched, self.patience(opposite))

@@ -129,7 +129,7 @@ class RecorderNode(WatcherNode[RecorderParameters]):
                 if tap.topic not in self._writer.counts:
                     self._add_topic(tap.topic, TOPICS[topic])
                 self._writer.write(tap.topic, messages)
-            self.keep_step(measured)
+            self.acknowledge(measured)
             now = time.monotonic()
             if now - self._flushed > self.parameters.flush_period:
                 self._flushed = now

@@ -110,7 +110,7 @@ class MonitorNode(WatcherNode[MonitorParameters]):
         except DecodeError as error:
             self._stop_watching(str(error))
             return
-        self.keep_step(arrived[KEYS[topics.MEASUREMENT]])
+        self.acknowledge(arrived[KEYS[topics.MEASUREMENT]])
         if self._watch.over(time.monotonic()):
             verdict = self._conclude()
             if self.parameters.exit_at_end:

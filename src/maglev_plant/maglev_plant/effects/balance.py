@@ -32,7 +32,6 @@ class BalanceArrays(Record):
     coupled: bool  # whether tilts and displacements are
     slide_x: float  # that x takes on by theta where nothing else pushes it, M_x,theta / M_x [m]
     slide_z: float  # z by phi
-    impulse: Annotated[FloatArray, 16]  # of the stops at the last contact, by their faces [N s]
 
 
 def mass_matrix(parameters: PlantParameters, machine: Machine) -> FloatArray:
@@ -69,7 +68,6 @@ def balance_arrays(parameters: PlantParameters, machine: Machine) -> BalanceArra
         pendulum=weight * balance.below,
         coupled=bool(np.any(inverse != np.diag(np.diag(inverse)))),
         slide_x=0.0 if parameters.guide.locked[X] else matrix[X, THETA] / matrix[X, X],
-        impulse=np.zeros(16),
         slide_z=0.0 if parameters.guide.locked[Z] else matrix[Z, PHI] / matrix[Z, Z],
     )
 

@@ -12,7 +12,7 @@ from rclpy.node import Node
 from maglev_node.samples import hear
 from maglev_node.topics import progress_of
 
-BEHIND = 2048
+WINDOW = 2048
 """Samples that a watcher may be behind before it is waited for: an eighth of what is kept."""
 
 PATIENCE = 1.0
@@ -23,7 +23,7 @@ holds the stage up and no more.
 """
 
 
-class InStep:
+class FlowControl:
     """How far the watchers of a stage are, who tell it each time they have taken measurements.
 
     One that has told nothing yet, as recorders of others, is not waited for; nor one that was
@@ -34,14 +34,14 @@ class InStep:
         self._node = node
         self._told: dict[str, tuple[int, float]] = {}  # sample, and when it was told
         self._subscriptions = [
-            hear(node, progress_of(name), partial(self._on_progress, name)) for name in names
+            hear(node, progress_of(name), partial(self._on_acknowledgement, name)) for name in names
         ]
 
-    def waits(self, sequence: int) -> bool:
-        """Whether a watcher is too far behind a sample for the next one to be taken."""
+    def holds(self, sequence: int) -> bool:
+        """Whether a watcher is a window behind a sample, and the next one is not to be taken."""
         now = time.monotonic()
         return any(
-            sequence - taken >= BEHIND and now - when < PATIENCE
+            sequence - taken >= WINDOW and now - when < PATIENCE
             for taken, when in self._told.values()
         )
 
@@ -50,5 +50,5 @@ class InStep:
         for subscription in self._subscriptions:
             self._node.destroy_subscription(subscription)
 
-    def _on_progress(self, name: str, measurement: Any) -> None:
+    def _on_acknowledgement(self, name: str, measurement: Any) -> None:
         self._told[name] = measurement.sequence, time.monotonic()

@@ -9,8 +9,8 @@ from made_up_node import MadeUpNode
 from made_up_stage import MadeUpStage, currents, start
 
 from maglev_msgs.msg import Measurement
-from maglev_node import in_step
-from maglev_node.in_step import BEHIND, PATIENCE
+from maglev_node import flow_control
+from maglev_node.flow_control import PATIENCE, WINDOW
 from maglev_node.topics import MEASUREMENT, progress_of
 
 NAMES = ('recorder', 'rosbag2')
@@ -29,7 +29,7 @@ class Clock:
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     """That by which patience goes."""
     clock = Clock()
-    monkeypatch.setattr(in_step, 'time', clock)
+    monkeypatch.setattr(flow_control, 'time', clock)
     return clock
 
 
@@ -59,38 +59,38 @@ def answer_all(node: MadeUpNode, until: int) -> int:
 
 def test_one_that_told_is_waited_for_until_it_tells_more(node: MadeUpNode) -> None:
     told(node, 10)
-    assert answer_all(node, 3 * BEHIND) == BEHIND + 10
-    node.answer(currents(BEHIND + 10, 0.5))  # once more: the sample is answered already
+    assert answer_all(node, 3 * WINDOW) == WINDOW + 10
+    node.answer(currents(WINDOW + 10, 0.5))  # once more: the sample is answered already
     node.tick()
-    assert node.measured[-1] == BEHIND + 10
+    assert node.measured[-1] == WINDOW + 10
     told(node, 30)
     node.tick()
-    assert answer_all(node, 3 * BEHIND) == BEHIND + 30
-    assert node.measured[-40:] == list(range(BEHIND - 9, BEHIND + 31))  # none twice, none left out
+    assert answer_all(node, 3 * WINDOW) == WINDOW + 30
+    assert node.measured[-40:] == list(range(WINDOW - 9, WINDOW + 31))  # none twice, none left out
     assert not node.failed
 
 
 def test_no_longer_than_it_goes_on_telling(node: MadeUpNode, clock: Clock) -> None:
     told(node, 10)
-    answer_all(node, 3 * BEHIND)
+    answer_all(node, 3 * WINDOW)
     clock.now += 0.99 * PATIENCE
     node.tick()
-    assert node.measured[-1] == BEHIND + 10
+    assert node.measured[-1] == WINDOW + 10
     clock.now += 0.02 * PATIENCE
     node.tick()
-    assert answer_all(node, 3 * BEHIND) == 3 * BEHIND
+    assert answer_all(node, 3 * WINDOW) == 3 * WINDOW
     told(node, 20)  # it goes on, and is waited for again
-    assert answer_all(node, 4 * BEHIND) == 3 * BEHIND
+    assert answer_all(node, 4 * WINDOW) == 3 * WINDOW
 
 
 def test_the_slowest_counts_and_who_never_told_does_not(node: MadeUpNode) -> None:
-    assert answer_all(node, 2 * BEHIND) == 2 * BEHIND
-    told(node, 2 * BEHIND)
-    assert answer_all(node, 4 * BEHIND) == 3 * BEHIND
-    told(node, 2 * BEHIND + 7, 'rosbag2')
-    told(node, 3 * BEHIND)
+    assert answer_all(node, 2 * WINDOW) == 2 * WINDOW
+    told(node, 2 * WINDOW)
+    assert answer_all(node, 4 * WINDOW) == 3 * WINDOW
+    told(node, 2 * WINDOW + 7, 'rosbag2')
+    told(node, 3 * WINDOW)
     node.tick()
-    assert answer_all(node, 4 * BEHIND) == 3 * BEHIND + 7
+    assert answer_all(node, 4 * WINDOW) == 3 * WINDOW + 7
 
 
 def test_in_real_time_it_waits_for_nobody() -> None:

@@ -7,7 +7,7 @@ from flight import LONG, airborne, fly
 from graph import Nodes, Observer
 
 from maglev_msgs.msg import ControllerState, Measurement
-from maglev_node.in_step import BEHIND, PATIENCE
+from maglev_node.flow_control import PATIENCE, WINDOW
 from maglev_node.topics import CONTROLLER_STATE, MEASUREMENT, TRUE_STATE, progress_of, sample_qos
 
 
@@ -24,15 +24,15 @@ def test_a_slow_watcher_loses_nothing_and_a_silent_one_holds_nothing_up(
     def held_at(told: int) -> bool:
         """Whether it waits for one that says so."""
         telling.publish(Measurement(sequence=told))
-        assert newest() <= told + BEHIND
-        return newest() == told + BEHIND
+        assert newest() <= told + WINDOW
+        return newest() == told + WINDOW
 
     first = newest()
     for told in range(first, first + 1000, 100):
         watching.wait(lambda told=told: held_at(told))
     held = newest()
-    watching.wait(lambda: newest() > held + 2 * BEHIND, timeout=4.0 * PATIENCE + 5.0)
-    modes = [m.mode for m in watching.look()[CONTROLLER_STATE] if m.sequence > held - BEHIND]
+    watching.wait(lambda: newest() > held + 2 * WINDOW, timeout=4.0 * PATIENCE + 5.0)
+    modes = [m.mode for m in watching.look()[CONTROLLER_STATE] if m.sequence > held - WINDOW]
     assert set(modes) == {ControllerState.REGULATING}
 
 
@@ -46,4 +46,4 @@ def test_each_tells_how_far_it_is(nodes: Nodes, observer: Observer, name: str) -
     observer.wait(lambda: airborne(observer))
     before = observer.newest(MEASUREMENT).sequence
     observer.wait(lambda: observer.newest(topic).sequence > before, timeout=2.0)
-    assert observer.newest(topic).sequence > observer.newest(MEASUREMENT).sequence - BEHIND
+    assert observer.newest(topic).sequence > observer.newest(MEASUREMENT).sequence - WINDOW
