@@ -84,9 +84,9 @@ class FaultParameters:
         within=(1e-6, 0.1),
     )
     silence: float = parameter(
-        0.2,
-        'x or z that has not counted for so long in flight is asked whether it does, by a push to '
-        'and fro that moves it by about one count; 0: never',
+        0.15,
+        'x or z that has not counted for so long in flight is asked whether it does, by pushes to '
+        'and fro that move it by about one count; 0: never',
         unit='s',
         within=(0.0, 60.0),
     )

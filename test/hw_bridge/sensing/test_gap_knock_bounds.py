@@ -19,6 +19,9 @@ THREE = [(0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)]
 ALL = (0, 1, 2, 3)
 PATIENCE = 30  # [samples]
 HARDEST = 4.6  # 2 (0.8 + 2.4 * 10 um / (4 ms)^2) [m/s²]
+SHARES = (1 / 16, 1 / 11, 1 / 8, 1 / 4, 1 / 2, 1.0)
+SOFTEST = HARDEST / 16
+WHOLE = 8 * len(SHARES) + 4  # unanswered [samples]
 
 
 def asked(silent: dict[int, int], **overrides: object) -> tuple[GapKnock, GuardArrays]:
@@ -37,13 +40,13 @@ def begins(asking: GapKnock, watched: GuardArrays, *, flying: bool = True) -> bo
 
 
 def answer(asking: GapKnock, watched: GuardArrays) -> None:
-    """All count soon, and it is pushed back."""
+    """All count soon."""
     for _ in range(2):
         watched.silent[:4] += 1
         assert asking.look(watched, True) == ()
     watched.silent[:] = 0
-    while asking._pushes.under_way:
-        assert asking.look(watched, True) == ()
+    assert asking.look(watched, True) == ()
+    assert not asking._pushes.under_way
 
 
 @pytest.mark.parametrize('late', [-1, 0, 1])
@@ -106,20 +109,20 @@ def test_with_the_flight_it_ends_and_is_forgotten() -> None:
     assert not begins(asking, watched)
 
 
-def test_three_times_to_and_fro_and_a_wait_then_it_is_told_who_did_not_count_since() -> None:
+def test_to_and_fro_and_a_wait_then_it_is_told_who_did_not_count_since() -> None:
     asking, watched = asked({0: PATIENCE, 1: PATIENCE, 2: 0, 3: 5})
     assert begins(asking, watched)
     pushes, found = [], []
-    for sample in range(28):
+    for sample in range(WHOLE):
         pushes.append(asking._pushes.acceleration)
         watched.silent[:4] += 1
         if sample == 10:
             watched.silent[3] = 0
         found.append(asking.look(watched, True))
-    hard = [HARDEST / 4.0, HARDEST / 2.0, HARDEST]
+    hard = [HARDEST * share for share in SHARES]
     to_and_fro = [push for a in hard for push in (a, a, a, a, -a, -a, -a, -a)]
     assert pushes == pytest.approx(to_and_fro + [0.0] * 4)
-    assert found == [()] * 27 + [(0, 1, 2)]
+    assert found == [()] * (WHOLE - 1) + [(0, 1, 2)]
     assert not asking._pushes.under_way
 
 
@@ -139,19 +142,37 @@ def test_the_hardest_moves_it_over_the_coarsest_count_against_twice_the_friction
     )
     pushes = GapKnock(parameters)._pushes
     free = 2.4 * 2e-5 / (length * period) ** 2
-    assert pushes._softest * 4.0 == pytest.approx(2.0 * (0.7 + free))
+    assert pushes._pushes[-1] == pytest.approx(2.0 * (0.7 + free))
     assert pushes._duration == length
 
 
-def test_it_goes_on_until_all_that_were_silent_have_counted() -> None:
-    asking, watched = asked({0: PATIENCE, 1: PATIENCE, 2: PATIENCE})
+@pytest.mark.parametrize('silent', [*TWO, *THREE, ALL])
+def test_it_goes_on_until_all_but_one_have_counted(silent: tuple[int, ...]) -> None:
+    asking, watched = asked(dict.fromkeys(silent, 2 * PATIENCE))
     assert begins(asking, watched)
-    for sample in range(1, 15):
-        watched.silent[:3] += 1
-        if sample in (2, 5, 11):  # gap 2 at last
-            watched.silent[[0, 2, 1][(2, 5, 11).index(sample)]] = 0
+    *answering, _ = silent
+    for sample in range(1, 3 * len(answering) + 1):
+        watched.silent[list(silent)] += 1
+        if sample % 3 == 0:
+            watched.silent[answering[sample // 3 - 1]] = 0
         assert asking.look(watched, True) == ()
-        assert asking._pushes.under_way == (sample < 14), sample
+        assert asking._pushes.under_way == (sample < 3 * len(answering)), sample
+
+
+@pytest.mark.parametrize(
+    ('passed', 'way'),
+    [((1, 1, 1), -1.0), ((-1, -1, -1), 1.0), ((1, -1, 1), -1.0), ((1, -1, -1), 1.0), ((0,) * 3, 1)],
+)
+def test_most_of_those_asked_are_pushed_back_over_their_last_edge(
+    passed: tuple[int, ...], way: float
+) -> None:
+    asking, watched = asked({})
+    assert not begins(asking, watched)
+    watched.believed[:4] += 1e-5 * np.array([passed[0], passed[1], -5, passed[2]])
+    assert not begins(asking, watched)
+    watched.silent[[0, 1, 3]] = PATIENCE  # gap 3 counts, and is not asked
+    assert begins(asking, watched)
+    assert asking._pushes.acceleration == pytest.approx(way * SOFTEST)
 
 
 def test_what_is_added_accelerates_y_by_as_much_and_takes_no_quadrature_current() -> None:
@@ -172,7 +193,7 @@ def test_what_is_added_accelerates_y_by_as_much_and_takes_no_quadrature_current(
 
     step = 1e-4 * (added - i_d)  # the attraction is a square: by its slope where it is
     slope = (along_y(i_d + step) - along_y(i_d - step)) / 2e-4
-    assert slope == pytest.approx(HARDEST / 4.0, rel=1e-6)
+    assert slope == pytest.approx(SOFTEST, rel=1e-6)
 
 
 def test_as_much_as_the_motors_have_is_not_too_much() -> None:

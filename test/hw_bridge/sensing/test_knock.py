@@ -17,7 +17,7 @@ COULOMB = np.array((0.303, 0.171, 0.149, 1.32, 1.32))  # the default's
 COUNT = 1e-5
 
 
-def standing(y: float, friction: float, silence: float = 0.2) -> Flight:
+def standing(y: float, friction: float, silence: float = 0.15) -> Flight:
     """Hovers at a gap [m], with so many times the default friction."""
     rubbing = {'emulation.guide.coulomb': (friction * COULOMB).tolist()}
     return Flight(hover(y), {**rubbing, 'fault.silence': silence})
@@ -36,7 +36,7 @@ def test_one_that_does_not_answer_is_landed_before_its_motors_run_away(
     flight = standing(y, 0.3)
     flight.run(300)
     flight.boards.stuck[encoder] = True
-    for _ in range(270):
+    for _ in range(290):
         if flight.stage.fault is None:
             flight.run(1)
     assert flight.stage.fault is not None
@@ -68,7 +68,7 @@ def test_a_sound_one_answers_and_the_platen_stays_within_a_count(y: float, frict
         flight.step()
         assert flight.stage.fault is None
         farthest = max(farthest, float(np.max(np.abs(across(flight)))))
-        asked += int(np.any(flight.stage.guard.arrays.silent[4:] == 200))
+        asked += int(np.any(flight.stage.guard.arrays.silent[4:] == 150))
     assert asked > 0
     assert farthest < COUNT
 
@@ -89,7 +89,7 @@ def test_on_the_rough_machine_it_stays_within_a_count_of_the_scale(
         between = flight.boards.past[flight.boards.ticks % len(flight.boards.past), 18:]
         scale = flight.stage.encoders.arrays.length[4:] + between[4:]
         farthest = max(farthest, float(np.max(np.abs(scale))))
-        asked += int(np.any(flight.stage.guard.arrays.silent[4:] == 200))
+        asked += int(np.any(flight.stage.guard.arrays.silent[4:] == 150))
     assert flight.stage.fault is None
     assert asked > 3
     assert farthest < COUNT

@@ -3,12 +3,13 @@
 Where a platen hovers, some gap or other goes to and fro over the edge of a count. If two or more
 are stuck the controller leaves the platen where they do not show, and within friction neither the
 others nor the model can tell. So all gaps at once are knocked, by a push along y to and fro, softly
-first, then twice as hard, and again. Sound ones may be silent together too, most of all where
-guides stick: each time all have answered, they are given twice as long.
+back over the edges that they passed last, then ever harder, until at most one of them has not
+answered: what follows that one goes astray where the others and the model show it. Sound ones may
+be silent together too, most of all where guides stick: each time they have answered, they are given
+twice as long.
 
 Of a machine with a single motor, which guides keep level, every gap shows y. There the controller
-goes astray only by all of them, so all must be silent, one that answers is enough, and they are
-asked more softly at first.
+goes astray only by all of them, so all must be silent, and one that answers is enough.
 """
 
 from __future__ import annotations
@@ -17,14 +18,14 @@ import numpy as np
 
 from maglev_hw_bridge.parameters import BridgeParameters
 from maglev_hw_bridge.sensing.guard_arrays import LOST, GuardArrays
-from maglev_hw_bridge.sensing.knock import Pushes, hardest_push, samples_to_push
+from maglev_hw_bridge.sensing.knock import Edges, Pushes, hardest_push, samples_to_push
 from maglev_model.axes import FloatArray, Y
 from maglev_model.compiled import compiled
 from maglev_model.machine import Machine, machine_constants
 from maglev_model.platen import output_accelerations
 
-_KNOCKS, _GROWTH = 3, 2.0
-_KNOCKS_FOR_ONE, _GROWTH_FOR_ONE = 8, 1.5  # where one answer is enough
+# Soft ones cost no time while friction holds; once loose a platen that nobody sees does not stay.
+_KNOCKS = (1 / 16, 1 / 11, 1 / 8, 1 / 4, 1 / 2, 1.0)  # of the hardest push
 _OPPOSITE = 2.0  # times the patience with others: two gaps of one tilt are silent together for long
 _MOST_PATIENT = 128.0  # times that of the beginning, however often they have answered
 
@@ -47,11 +48,10 @@ class GapKnock:
         self._machine = machine_constants(parameters.machine)
         self._one_is_enough = parameters.machine.motors == 1  # that answers, for all gaps show y
         count = max(parameters.encoder.resolution[:4])
-        self._pushes = Pushes(
-            hardest_push(parameters, Y, count),
-            samples_to_push(parameters.sample_time),
-            *((_KNOCKS_FOR_ONE, _GROWTH_FOR_ONE) if self._one_is_enough else (_KNOCKS, _GROWTH)),
-        )
+        hardest = hardest_push(parameters, Y, count)
+        duration = samples_to_push(parameters.sample_time)
+        self._pushes = Pushes(hardest, duration, _KNOCKS)
+        self._edges = Edges(4)
         self._asked: tuple[int, ...] = ()
         self._samples = 0  # since they are
         self._opposite = False  # whether these are two gaps of one tilt
@@ -61,6 +61,7 @@ class GapKnock:
 
     def look(self, watched: GuardArrays, flying: bool) -> tuple[int, ...]:
         """One sample; which have not counted while all were knocked. Ends with the flight."""
+        self._edges.follow(watched.believed[:4])
         if not flying or self._patience == 0:
             self._pushes.under_way = False
             self._answered[:] = 0, 0
@@ -70,7 +71,7 @@ class GapKnock:
             return ()
         self._samples += 1
         silent = self._silent(watched, self._samples, self._asked)
-        enough = 1 if self._one_is_enough else len(self._asked)
+        enough = 1 if self._one_is_enough else len(self._asked) - 1
         if self._pushes.go_on(len(self._asked) - len(silent) >= enough):
             return self._silent(watched, self._samples)
         if not self._pushes.under_way:
@@ -93,7 +94,8 @@ class GapKnock:
             silent = self._silent(watched, self.patience(opposite))
             if len(silent) >= 2 and opposite == (silent in ((0, 2), (1, 3))):
                 self._asked, self._opposite, self._samples = silent, opposite, 0
-                self._pushes.begin(1.0)
+                passed = sum(self._edges.passed[i] for i in silent)
+                self._pushes.begin(-1.0 if passed > 0.0 else 1.0)
                 return
 
     def patience(self, opposite: bool) -> int:

@@ -22,7 +22,7 @@ from maglev_model.machine import Machine, machine_constants
 from maglev_model.platen import output_accelerations
 
 _PUSH = 4e-3  # in either direction [s]
-_KNOCKS, _GROWTH = 7, 1.5  # at the most; how much harder each is than the one before
+_KNOCKS = tuple(1.25**n for n in range(-15, 1))  # of the hardest push
 _COUNTS = 1.2  # by which the platen is moved at least, by half of the hardest
 _HARDEST = 2.0
 
@@ -48,46 +48,56 @@ def _thrust(machine: Machine, position: FloatArray, i_d: FloatArray, axis: int) 
 
 
 class Pushes:
-    """To and fro, each pair harder than the one before, until what is pushed answers."""
+    """To and fro, each pair harder than the one before, until what is pushed answers.
 
-    def __init__(self, hardest: float, duration: int, knocks: int, growth: float) -> None:
-        """``hardest`` push [m/s²], the last of ``knocks``; in samples ``duration``."""
-        self._softest, self._duration = hardest / growth ** (knocks - 1), duration
-        self._most, self._growth = knocks, growth
+    No push back follows the answer: the controller sees that motion too, and brakes it.
+    """
+
+    def __init__(self, hardest: float, duration: int, shares: tuple[float, ...]) -> None:
+        """In turn ``shares`` of the ``hardest`` push [m/s²], each for ``duration`` samples."""
+        self._pushes = [hardest * share for share in shares]
+        self._duration = duration
         self.begin(0.0)
         self.under_way = False
 
     def begin(self, sign: float) -> None:
-        """Knock softly that way first, unanswered so far."""
-        self.under_way, self._answered = True, False
-        self._knocks = 0
-        self._knock(sign * self._softest)
-
-    def _knock(self, push: float) -> None:
-        """Begin one: ``push`` [m/s²] until the turn, and back for as long."""
-        self._samples, self._turn, self._push = 0, self._duration, push
-        self._knocks += 1
+        """Knock softly that way first."""
+        self.under_way, self._sign = True, sign
+        self._knock = self._samples = 0
 
     def go_on(self, counted: bool) -> bool:
         """One sample later; whether the platen must have moved and was not seen to."""
         self._samples += 1
-        if counted and not self._answered:
-            self._answered, self._turn = True, min(self._turn, self._samples)
-        last = self._knocks == self._most
-        if self._samples < 2 * self._turn + (self._duration if last and not self._answered else 0):
-            return False
-        if self._answered or last:
+        last = self._knock == len(self._pushes) - 1
+        if counted:
             self.under_way = False
-            return not self._answered
-        self._knock(self._growth * self._push)
-        return False
+        elif self._samples == (3 if last else 2) * self._duration:
+            self.under_way = not last
+            self._knock, self._samples = self._knock + 1, 0
+        return not (counted or self.under_way)
 
     @property
     def acceleration(self) -> float:
         """To push with [m/s²]."""
-        if self._samples < self._turn:
-            return self._push
-        return -self._push if self._samples < 2 * self._turn else 0.0
+        push = self._sign * self._pushes[self._knock]
+        if self._samples < self._duration:
+            return push
+        return -push if self._samples < 2 * self._duration else 0.0
+
+
+class Edges:
+    """Which way encoders passed the last edge of a count: it is nearest going back."""
+
+    def __init__(self, encoders: int) -> None:
+        self._reading = np.full(encoders, math.nan)  # [m]
+        self.passed = [0.0] * encoders  # 0: none yet
+
+    def follow(self, reading: FloatArray) -> None:
+        """One sample; (encoders,) [m]."""
+        for i, change in enumerate((reading - self._reading).tolist()):
+            if abs(change) > 0.0:  # not the first time
+                self.passed[i] = math.copysign(1.0, change)
+        self._reading[:] = reading
 
 
 class _Asked(Pushes):
@@ -95,15 +105,8 @@ class _Asked(Pushes):
 
     def __init__(self, axis: int, hardest: float, duration: int) -> None:
         """``hardest`` push [m/s²], in samples ``duration``."""
-        super().__init__(hardest, duration, _KNOCKS, _GROWTH)
+        super().__init__(hardest, duration, _KNOCKS)
         self.axis = axis
-        self._reading = 0.0  # [m]
-        self.passed = 0.0  # which way the last edge was: it is nearest going back
-
-    def follow(self, reading: float) -> None:
-        if reading != self._reading:
-            self.passed = math.copysign(1.0, reading - self._reading)
-            self._reading = reading
 
 
 class Knock:
@@ -116,6 +119,7 @@ class Knock:
         self._limit = fault.largest_amplitude
         self._machine = machine_constants(parameters.machine)
         self._i_q = np.zeros(4)
+        self._edges = Edges(2)
         nearest = np.array([parameters.machine.gap_min, 0.0, 0.0, 0.0, 0.0])
         self._asked = tuple(
             _Asked(
@@ -129,15 +133,16 @@ class Knock:
 
     def look(self, watched: GuardArrays, flying: bool) -> int | None:
         """One sample; the encoder, 4 or 5, that does not count. Ends with the flight."""
+        self._edges.follow(watched.believed[4:])
         for asked in self._asked:
-            asked.follow(watched.believed[3 + asked.axis])
             asked.under_way = asked.under_way and flying
             silent = watched.silent[3 + asked.axis]
             if asked.under_way:
                 if asked.go_on(silent == 0):
                     return 3 + asked.axis
             elif 0 < self._patience <= silent:
-                asked.begin(-asked.passed or self._leaning(watched, asked.axis))
+                passed = self._edges.passed[asked.axis - X]
+                asked.begin(-passed or self._leaning(watched, asked.axis))
         return None
 
     @staticmethod
