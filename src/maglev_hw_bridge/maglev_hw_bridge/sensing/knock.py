@@ -57,32 +57,28 @@ class Pushes:
         """In turn ``shares`` of the ``hardest`` push [m/s²], each for ``duration`` samples."""
         self._pushes = [hardest * share for share in shares]
         self._duration = duration
-        self.begin(0.0)
+        self._whole = (2 * len(shares) + 1) * duration  # with a wait for the last answer
+        self._sign, self._samples = 0.0, 0
         self.under_way = False
 
     def begin(self, sign: float) -> None:
         """Knock softly that way first."""
-        self.under_way, self._sign = True, sign
-        self._knock = self._samples = 0
+        self.under_way, self._sign, self._samples = True, sign, 0
 
     def go_on(self, counted: bool) -> bool:
         """One sample later; whether the platen must have moved and was not seen to."""
         self._samples += 1
-        last = self._knock == len(self._pushes) - 1
-        if counted:
-            self.under_way = False
-        elif self._samples == (3 if last else 2) * self._duration:
-            self.under_way = not last
-            self._knock, self._samples = self._knock + 1, 0
-        return not (counted or self.under_way)
+        over = self._samples == self._whole
+        self.under_way = not (counted or over)
+        return over and not counted
 
     @property
     def acceleration(self) -> float:
         """To push with [m/s²]."""
-        push = self._sign * self._pushes[self._knock]
-        if self._samples < self._duration:
-            return push
-        return -push if self._samples < 2 * self._duration else 0.0
+        knock, back = divmod(self._samples // self._duration, 2)
+        if not self.under_way or knock == len(self._pushes):
+            return 0.0
+        return (-self._sign if back else self._sign) * self._pushes[knock]
 
 
 class Edges:
